@@ -1,0 +1,373 @@
+"""`Spacecraft` and `Legs`: the vocabulary that every other part exchanges."""
+
+import dataclasses
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, Self, final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from feasibility.constants import AU, DAY_S, G0, MU_SUN, YEAR_DAYS
+from feasibility.errors import InputError
+
+_MIN_RADIUS_M = 0.01 * AU
+_AU_SLIP_M = 1e6
+_MAX_RADIUS_M = 1e4 * AU
+_SLOW_FRACTION = 0.01
+_VELOCITY_SLIPS = {"km/s": 1e3, "AU/day": AU / DAY_S, "AU/year": AU / (DAY_S * YEAR_DAYS)}
+_MAX_TOF_DAYS = 1e5
+_MAX_THRUST_N = 1e3
+_MAX_ISP_S = 2e4
+_MAX_MASS_KG = 1e7
+
+
+@final
+@dataclass(frozen=True)
+class Spacecraft:
+    """A spacecraft with electric propulsion at constant thrust and specific impulse.
+
+    Parameters
+    ----------
+    m_dry : float
+        Dry mass in kg, zero or more: the least final mass of a leg.
+    thrust : float
+        Maximum thrust in N.
+    isp : float
+        Specific impulse in s.
+
+    Raises
+    ------
+    InputError
+        A value is not finite, not positive, or evidently in another unit.
+
+    Examples
+    --------
+    >>> gtoc7_probe = Spacecraft(m_dry=800.0, thrust=0.3, isp=3000.0)
+    >>> round(gtoc7_probe.exhaust_velocity)
+    29420
+    """
+
+    m_dry: float
+    thrust: float
+    isp: float
+
+    def __post_init__(self) -> None:
+        for name in ("m_dry", "thrust", "isp"):
+            value = np.asarray(getattr(self, name), dtype=float)
+            if value.ndim:
+                raise InputError(
+                    f"Spacecraft {name}: expected one number, got shape {value.shape}"
+                )
+            _check_scalar_column(f"Spacecraft {name}", value.reshape(1), name)
+            object.__setattr__(self, name, float(value))
+
+    @property
+    def exhaust_velocity(self) -> float:
+        """Effective exhaust velocity isp * g0 in m/s."""
+        return self.isp * G0
+
+
+@final
+@dataclass(frozen=True, eq=False, repr=False)
+class Legs:
+    """Many legs as a frozen struct of arrays, one row a leg.
+
+    With n the number of legs; scalars and single rows are broadcast to n.
+    Arrays are copied once, validated once and made read-only.
+
+    Parameters
+    ----------
+    rv_dep, rv_arr : array_like
+        (n, 6) float64, m and m/s: heliocentric state of the departure body at
+        departure and of the arrival body at arrival. The leg is a rendezvous
+        at both ends.
+    tof_days : array_like
+        (n,) float64: time of flight in days.
+    m0 : array_like
+        (n,) float64, kg: initial mass.
+    thrust : array_like
+        (n,) float64, N: maximum thrust.
+    isp : array_like
+        (n,) float64, s: specific impulse.
+    m_dry : array_like
+        (n,) float64, kg: dry mass, zero or more and at most `m0`.
+    t_dep_mjd2000 : array_like, optional
+        (n,) float64: departure epoch. Not used by the dynamics.
+    dep_id, arr_id : array_like, optional
+        (n,) int64: ids of the bodies. Not used by the dynamics.
+
+    Raises
+    ------
+    InputError
+        A shape does not fit, a value is not finite or not positive, or a
+        column is evidently in another unit (a position in AU or km, a
+        velocity in km/s, a time in seconds, a thrust in mN). The message names
+        the column and the first bad row.
+
+    Examples
+    --------
+    >>> craft = Spacecraft(m_dry=800.0, thrust=0.3, isp=3000.0)
+    >>> legs = Legs(
+    ...     rv_dep=[4.0e11, 0, 0, 0, 1.8e4, 0],
+    ...     rv_arr=[[0, 4.1e11, 0, -1.8e4, 0, 0], [0, 4.2e11, 0, -1.8e4, 0, 0]],
+    ...     tof_days=[400.0, 410.0],
+    ...     m0=2000.0,
+    ...     thrust=craft.thrust,
+    ...     isp=craft.isp,
+    ...     m_dry=craft.m_dry,
+    ... )
+    >>> len(legs)
+    2
+    """
+
+    rv_dep: NDArray[np.float64]
+    rv_arr: NDArray[np.float64]
+    tof_days: NDArray[np.float64]
+    m0: NDArray[np.float64]
+    thrust: NDArray[np.float64]
+    isp: NDArray[np.float64]
+    m_dry: NDArray[np.float64]
+    t_dep_mjd2000: NDArray[np.float64] | None = None
+    dep_id: NDArray[np.int64] | None = None
+    arr_id: NDArray[np.int64] | None = None
+
+    def __init__(
+        self,
+        rv_dep: ArrayLike,
+        rv_arr: ArrayLike,
+        tof_days: ArrayLike,
+        m0: ArrayLike,
+        thrust: ArrayLike,
+        isp: ArrayLike,
+        m_dry: ArrayLike,
+        *,
+        t_dep_mjd2000: ArrayLike | None = None,
+        dep_id: ArrayLike | None = None,
+        arr_id: ArrayLike | None = None,
+    ) -> None:
+        given = {
+            "rv_dep": rv_dep,
+            "rv_arr": rv_arr,
+            "tof_days": tof_days,
+            "m0": m0,
+            "thrust": thrust,
+            "isp": isp,
+            "m_dry": m_dry,
+            "t_dep_mjd2000": t_dep_mjd2000,
+            "dep_id": dep_id,
+            "arr_id": arr_id,
+        }
+        arrays = {
+            name: _as_array(name, value) for name, value in given.items() if value is not None
+        }
+        n = _common_length(arrays)
+        for name in given:
+            column = _broadcast(name, arrays[name], n) if name in arrays else None
+            object.__setattr__(self, name, column)
+        self._validate()
+
+    def __len__(self) -> int:
+        return len(self.tof_days)
+
+    def __repr__(self) -> str:
+        return f"Legs(n={len(self)})"
+
+    @property
+    def tof_s(self) -> NDArray[np.float64]:
+        """(n,) time of flight in seconds."""
+        return self.tof_days * DAY_S
+
+    @property
+    def exhaust_velocity(self) -> NDArray[np.float64]:
+        """(n,) effective exhaust velocity isp * g0 in m/s."""
+        return self.isp * G0
+
+    def take(self, rows: ArrayLike) -> Self:
+        """Return the legs at the given rows (indices or a boolean mask), in that order."""
+        index = np.asarray(rows)
+        if index.size == 0:
+            index = index.astype(np.intp)
+        return self._trusted({name: column[index] for name, column in self._columns()})
+
+    def with_m0(self, m0: ArrayLike) -> Self:
+        """Return the same legs with other initial masses.
+
+        Parameters
+        ----------
+        m0 : array_like
+            (n,) kg, or one value for all; at least the dry mass.
+
+        Raises
+        ------
+        InputError
+            As for the constructor.
+        """
+        columns = dict(self._columns())
+        columns["m0"] = _broadcast("m0", _as_array("m0", m0), len(self))
+        legs = self._trusted(columns)
+        legs._validate_masses()
+        return legs
+
+    @classmethod
+    def concatenate(cls, parts: Sequence["Legs"]) -> "Legs":
+        """Return the rows of all parts, in order; optional columns only if all parts have them.
+
+        Raises
+        ------
+        InputError
+            `parts` is empty.
+        """
+        if not parts:
+            raise InputError("Legs.concatenate: expected at least one part, got none")
+        columns = {}
+        for field in dataclasses.fields(cls):
+            values = [getattr(part, field.name) for part in parts]
+            if all(value is not None for value in values):
+                columns[field.name] = np.concatenate(values)
+        return cls._trusted(columns)
+
+    def _columns(self) -> Iterator[tuple[str, NDArray[Any]]]:
+        for field in dataclasses.fields(self):
+            column = getattr(self, field.name)
+            if column is not None:
+                yield field.name, column
+
+    @classmethod
+    def _trusted(cls, columns: dict[str, NDArray[Any]]) -> Self:
+        """Build from columns that were validated before: selections of valid legs are valid."""
+        legs = cls.__new__(cls)
+        for field in dataclasses.fields(cls):
+            column = columns.get(field.name)
+            if column is not None:
+                column.flags.writeable = False
+            object.__setattr__(legs, field.name, column)
+        return legs
+
+    def _validate(self) -> None:
+        _check_state("rv_dep", self.rv_dep)
+        _check_state("rv_arr", self.rv_arr)
+        for name in ("tof_days", "thrust", "isp"):
+            _check_scalar_column(f"Legs {name}", getattr(self, name), name)
+        self._validate_masses()
+        if self.t_dep_mjd2000 is not None:
+            _check_finite("Legs t_dep_mjd2000", self.t_dep_mjd2000)
+
+    def _validate_masses(self) -> None:
+        _check_scalar_column("Legs m0", self.m0, "m0")
+        _check_scalar_column("Legs m_dry", self.m_dry, "m_dry")
+        bad = self.m0 < self.m_dry
+        if bad.any():
+            row = int(np.argmax(bad))
+            raise InputError(
+                f"Legs m0, row {row}: {self.m0[row]:g} kg is below the dry mass of "
+                f"{self.m_dry[row]:g} kg"
+            )
+
+
+def _as_array(name: str, value: ArrayLike) -> NDArray[Any]:
+    dtype = np.int64 if name in ("dep_id", "arr_id") else np.float64
+    try:
+        array = np.array(value, dtype=dtype)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"Legs {name}: expected numbers ({error})") from None
+    if name in ("rv_dep", "rv_arr"):
+        if array.ndim == 1:
+            array = array.reshape(1, -1)
+        if array.ndim != 2 or array.shape[1] != 6:
+            raise InputError(
+                f"Legs {name}: expected shape (n, 6), position and velocity, got {np.shape(value)}"
+            )
+    elif array.ndim == 0:
+        array = array.reshape(1)
+    elif array.ndim != 1:
+        raise InputError(f"Legs {name}: expected shape (n,), got {array.shape}")
+    return array
+
+
+def _common_length(arrays: dict[str, NDArray[Any]]) -> int:
+    lengths = {name: len(array) for name, array in arrays.items() if len(array) != 1}
+    n = next(iter(lengths.values()), 1)
+    for name, length in lengths.items():
+        if length != n:
+            first = next(iter(lengths))
+            raise InputError(
+                f"Legs {name}: {length} rows, but {first} has {n}; expected the same or one"
+            )
+    return n
+
+
+def _broadcast(name: str, array: NDArray[Any], n: int) -> NDArray[Any]:
+    if len(array) not in (1, n):
+        raise InputError(f"Legs {name}: {len(array)} rows, expected {n} or one")
+    if len(array) != n:
+        array = np.repeat(array, n, axis=0) if n else array[:0]
+    array = np.ascontiguousarray(array)
+    array.flags.writeable = False
+    return array
+
+
+def _check_finite(label: str, column: NDArray[np.float64]) -> None:
+    bad = ~np.isfinite(column)
+    if bad.any():
+        row = int(np.argmax(bad if bad.ndim == 1 else bad.any(axis=1)))
+        raise InputError(f"{label}, row {row}: {column[row]} is not finite")
+
+
+# What a value beyond these limits usually is: (limit, unit that was probably meant).
+_UPPER_LIMITS = {
+    "tof_days": (_MAX_TOF_DAYS, "days", "seconds"),
+    "thrust": (_MAX_THRUST_N, "N", "mN"),
+    "isp": (_MAX_ISP_S, "s", "m/s, an exhaust velocity"),
+    "m0": (_MAX_MASS_KG, "kg", "g"),
+    "m_dry": (_MAX_MASS_KG, "kg", "g"),
+}
+
+
+def _check_scalar_column(label: str, column: NDArray[np.float64], name: str) -> None:
+    _check_finite(label, column)
+    limit, unit, slip = _UPPER_LIMITS[name]
+    not_positive = column < 0 if name == "m_dry" else column <= 0
+    if not_positive.any():
+        row = int(np.argmax(not_positive))
+        floor = "zero or more" if name == "m_dry" else "more than zero"
+        raise InputError(f"{label}, row {row}: {column[row]:g} {unit}, expected {floor}")
+    too_large = column > limit
+    if too_large.any():
+        row = int(np.argmax(too_large))
+        raise InputError(
+            f"{label}, row {row}: {column[row]:g} {unit} is beyond {limit:g} {unit}; "
+            f"is it in {slip}?"
+        )
+
+
+def _check_state(name: str, rv: NDArray[np.float64]) -> None:
+    _check_finite(f"Legs {name}", rv)
+    radius = np.sqrt(np.einsum("ij,ij->i", rv[:, :3], rv[:, :3]))
+    speed = np.sqrt(np.einsum("ij,ij->i", rv[:, 3:], rv[:, 3:]))
+    bad_radius = (radius < _MIN_RADIUS_M) | (radius > _MAX_RADIUS_M)
+    if bad_radius.any():
+        row = int(np.argmax(bad_radius))
+        slip = ""
+        if 0 < radius[row] < _AU_SLIP_M:
+            slip = "; is it in AU?"
+        elif 0 < radius[row] < _MIN_RADIUS_M:
+            slip = "; is it in km?"
+        raise InputError(
+            f"Legs {name}, row {row}: distance from the Sun {radius[row]:g} m, expected "
+            f"{_MIN_RADIUS_M:.2g} to {_MAX_RADIUS_M:.2g} m{slip}"
+        )
+    # The local circular speed tells metres from kilometres per second at any distance.
+    circular = np.sqrt(MU_SUN / radius)
+    slow = speed < _SLOW_FRACTION * circular
+    fast = speed > circular / _SLOW_FRACTION
+    if (slow | fast).any():
+        row = int(np.argmax(slow | fast))
+        slip = ""
+        for unit, metres_per_second in _VELOCITY_SLIPS.items():
+            if 0.2 < metres_per_second * speed[row] / circular[row] < 1.5:
+                slip = f"; is it in {unit}?"
+        raise InputError(
+            f"Legs {name}, row {row}: speed {speed[row]:g} m/s where a circular orbit has "
+            f"{circular[row]:.4g} m/s{slip}"
+        )

@@ -1,0 +1,93 @@
+"""`LegSolutions`: what every leg solver returns, one row a leg."""
+
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Final, Self, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+MISMATCH_TOLERANCE: Final = 1e-6
+"""Largest mismatch of a closed leg, in units of AU, Earth velocity and initial mass."""
+
+THROTTLE_TOLERANCE: Final = 1e-6
+"""By how much the norm of a throttle may exceed 1 through rounding in a solver."""
+
+
+@final
+class Status(IntEnum):
+    """How the solution of one leg ended."""
+
+    CONVERGED = 0
+    """A closed leg, confirmed by pykep's own leg."""
+    NOT_CONVERGED = 1
+    """No start led to a closed leg."""
+    BELOW_DRY_MASS = 2
+    """Closed, but the final mass is below the dry mass (minimum propellant only)."""
+    TOO_HEAVY = 3
+    """The initial mass exceeds the maximum initial mass: not flyable (minimum propellant only)."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class LegSolutions:
+    """Sims-Flanagan legs as found by a solver; a failed solve is a row, not an exception.
+
+    With n the number of legs and s the number of segments.
+
+    Attributes
+    ----------
+    throttles : (n, s, 3) float64
+        Throttle vectors, norm at most 1, heliocentric frame; NaN where not converged.
+    m0 : (n,) float64, kg
+        Initial mass: the maximum initial mass m* or the given one. For a
+        maximum-initial-mass solve 0 where not converged.
+    m_final : (n,) float64, kg
+        Final mass; 0 where not converged.
+    mismatch : (n,) float64
+        Largest absolute mismatch at the match point, in units of AU,
+        `constants.EARTH_VELOCITY` and `m0`; inf where not converged.
+    converged : (n,) bool
+        Closed to `MISMATCH_TOLERANCE` with throttles at most 1 + `THROTTLE_TOLERANCE`.
+    status : (n,) int8
+        `Status` values.
+    start : (n,) int16
+        Which start won (an index into the solver's own list), -1 where none did.
+    seconds : (n,) float64
+        Processor time spent on the leg.
+    """
+
+    throttles: NDArray[np.float64]
+    m0: NDArray[np.float64]
+    m_final: NDArray[np.float64]
+    mismatch: NDArray[np.float64]
+    converged: NDArray[np.bool_]
+    status: NDArray[np.int8]
+    start: NDArray[np.int16]
+    seconds: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        return len(self.m0)
+
+    @property
+    def n_segments(self) -> int:
+        """Number of segments, s."""
+        return self.throttles.shape[1]
+
+    def take(self, rows: NDArray[np.intp] | NDArray[np.bool_]) -> Self:
+        """Return the solutions at the given rows (indices or a boolean mask)."""
+        return type(self)(
+            *(
+                getattr(self, name)[rows]
+                for name in (
+                    "throttles",
+                    "m0",
+                    "m_final",
+                    "mismatch",
+                    "converged",
+                    "status",
+                    "start",
+                    "seconds",
+                )
+            )
+        )
