@@ -1,0 +1,29 @@
+"""Orbits: element conversions, catalogues of bodies, their ephemerides and neighbours.
+
+Floor 2 of the house: knows the vocabulary and nothing above it. Importing it
+is cheap; the compiled kernels are loaded when they are first used.
+"""
+
+from feasibility.orbits.catalogue import Catalogue
+from feasibility.orbits.earth import earth
+from feasibility.orbits.elements import (
+    cartesian_to_classical,
+    cartesian_to_equinoctial,
+    classical_to_cartesian,
+    classical_to_equinoctial,
+    equinoctial_to_cartesian,
+    equinoctial_to_classical,
+)
+from feasibility.orbits.neighbours import OrbitalNeighbours
+
+__all__ = [
+    "Catalogue",
+    "OrbitalNeighbours",
+    "cartesian_to_classical",
+    "cartesian_to_equinoctial",
+    "classical_to_cartesian",
+    "classical_to_equinoctial",
+    "earth",
+    "equinoctial_to_cartesian",
+    "equinoctial_to_classical",
+]

@@ -1,0 +1,304 @@
+"""`Catalogue`: many bodies on Kepler orbits, and where they are at any epoch."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from feasibility.constants import DAY_S, MU_SUN
+from feasibility.errors import InputError
+from feasibility.orbits.elements import perifocal_axes
+
+
+@final
+@dataclass(frozen=True, eq=False, repr=False)
+class Catalogue:
+    """Bodies in heliocentric two-body motion, one row a body.
+
+    With n the number of bodies. Arrays are copied once, validated once and
+    made read-only.
+
+    Parameters
+    ----------
+    ids : array_like
+        (n,) int64, all different.
+    names : sequence of str
+        n names, for people; they need not differ.
+    epoch_mjd2000 : array_like
+        (n,) float64, or one value for all: epoch of the elements.
+    elements : array_like
+        (n, 6) float64: a [m], e, i, node, argp, mean anomaly [rad], osculating
+        at the epoch, heliocentric J2000 ecliptic.
+    source : str
+        Where the bodies come from: a file name, or how they were made.
+
+    Raises
+    ------
+    InputError
+        A shape does not fit, a value is not finite, an orbit is not an ellipse
+        (a <= 0 or e outside [0, 1)), or an id occurs twice. The message names
+        the first bad row.
+
+    Examples
+    --------
+    >>> from feasibility.orbits import earth
+    >>> r = earth().states(0.0)[0, :3]
+    >>> bool(1.4e11 < (r @ r) ** 0.5 < 1.6e11)
+    True
+    """
+
+    ids: NDArray[np.int64]
+    names: tuple[str, ...]
+    epoch_mjd2000: NDArray[np.float64]
+    elements: NDArray[np.float64]
+    source: str
+
+    def __init__(
+        self,
+        ids: ArrayLike,
+        names: Sequence[str],
+        epoch_mjd2000: ArrayLike,
+        elements: ArrayLike,
+        source: str,
+    ) -> None:
+        id_column = _integers("Catalogue ids", ids)
+        element_rows = np.array(elements, dtype=np.float64)
+        n = len(id_column)
+        if n == 0:
+            element_rows = element_rows.reshape(0, 6)
+        if element_rows.shape != (n, 6):
+            raise InputError(
+                f"Catalogue elements: expected shape ({n}, 6), one row an id, "
+                f"got {element_rows.shape}"
+            )
+        if len(names) != n:
+            raise InputError(f"Catalogue names: {len(names)} names, expected {n}, one an id")
+        epochs = np.array(epoch_mjd2000, dtype=np.float64)
+        if epochs.shape not in ((), (1,), (n,)):
+            raise InputError(
+                f"Catalogue epoch_mjd2000: expected shape ({n},) or one value, got {epochs.shape}"
+            )
+        epochs = np.broadcast_to(epochs, (n,)).copy()
+        _check_orbits(epochs, element_rows)
+        _check_distinct(id_column)
+        for array in (id_column, epochs, element_rows):
+            array.flags.writeable = False
+        object.__setattr__(self, "ids", id_column)
+        object.__setattr__(self, "names", tuple(str(name) for name in names))
+        object.__setattr__(self, "epoch_mjd2000", epochs)
+        object.__setattr__(self, "elements", element_rows)
+        object.__setattr__(self, "source", source)
+
+    def __len__(self) -> int:
+        return len(self.ids)
+
+    def __repr__(self) -> str:
+        return f"Catalogue(n={len(self)}, source={self.source!r})"
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave out what can be derived: catalogues travel to worker processes."""
+        fields = self.__dataclass_fields__
+        return {name: value for name, value in self.__dict__.items() if name in fields}
+
+    @property
+    def period_days(self) -> NDArray[np.float64]:
+        """(n,) orbital period in days."""
+        result: NDArray[np.float64] = 2.0 * np.pi / self._mean_motion / DAY_S
+        return result
+
+    def rows_of(self, ids: ArrayLike) -> NDArray[np.int64]:
+        """Return the rows of the given ids.
+
+        Parameters
+        ----------
+        ids : array_like
+            (k,) integers, or one.
+
+        Returns
+        -------
+        NDArray
+            (k,) int64.
+
+        Raises
+        ------
+        InputError
+            An id is not in the catalogue.
+        """
+        wanted = _integers("ids", ids)
+        order, ordered = self._id_index
+        place = np.searchsorted(ordered, wanted)
+        known = place < len(ordered)
+        known[known] = ordered[place[known]] == wanted[known]
+        if not known.all():
+            stranger = wanted[int(np.argmin(known))]
+            raise InputError(f"id {stranger} is not in {self.source} ({len(self)} bodies)")
+        return order[place]
+
+    def states(self, t_mjd2000: float) -> NDArray[np.float64]:
+        """Return the states of all bodies at one epoch.
+
+        Parameters
+        ----------
+        t_mjd2000 : float
+            Epoch.
+
+        Returns
+        -------
+        NDArray
+            (n, 6) float64, m and m/s.
+
+        Raises
+        ------
+        InputError
+            The epoch is not one finite number.
+        """
+        if np.ndim(t_mjd2000) != 0:
+            raise InputError(
+                f"epoch: expected one number, got shape {np.shape(t_mjd2000)}; "
+                "states_at takes one epoch a body"
+            )
+        return self.states_at(np.arange(len(self)), t_mjd2000)
+
+    def states_at(self, rows: ArrayLike, t_mjd2000: ArrayLike) -> NDArray[np.float64]:
+        """Return the states of chosen bodies, each at its own epoch.
+
+        Parameters
+        ----------
+        rows : array_like
+            (k,) rows of the catalogue, 0 to n - 1, repeats allowed.
+        t_mjd2000 : array_like
+            (k,) epochs, or one for all.
+
+        Returns
+        -------
+        NDArray
+            (k, 6) float64, m and m/s.
+
+        Raises
+        ------
+        InputError
+            A row is out of range, the shapes do not fit, or an epoch is not finite.
+        """
+        # numba takes a third of a second to import: pay when the first state is asked for.
+        from feasibility.orbits.catalogue_kernels import propagate_rows
+
+        index, epochs = self.checked_queries(rows, t_mjd2000)
+        states: NDArray[np.float64] = propagate_rows(self._orbits, index, epochs)
+        return states
+
+    def checked_queries(
+        self, rows: ArrayLike, t_mjd2000: ArrayLike
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """Validate pairs of row and epoch once, and broadcast one epoch to all rows.
+
+        Returns
+        -------
+        tuple of NDArray
+            (k,) int64 rows and (k,) float64 epochs in MJD2000.
+
+        Raises
+        ------
+        InputError
+            A row is out of range, the shapes do not fit, or an epoch is not finite.
+        """
+        index = self._checked_rows(rows)
+        epochs = np.asarray(t_mjd2000, dtype=np.float64)
+        if epochs.shape not in ((), (1,), index.shape):
+            raise InputError(
+                f"epochs: expected shape ({len(index)},) or one value, got {epochs.shape}"
+            )
+        if not np.isfinite(epochs).all():
+            raise InputError("epochs: expected finite numbers, got a NaN or an infinity")
+        return index, np.ascontiguousarray(np.broadcast_to(epochs, index.shape))
+
+    def select(self, rows: ArrayLike) -> "Catalogue":
+        """Return a catalogue of the given rows (indices or a boolean mask), in that order.
+
+        Raises
+        ------
+        InputError
+            A row is out of range or given twice, or the mask has another length.
+        """
+        mask = np.asarray(rows)
+        if mask.dtype == bool:
+            if mask.shape != (len(self),):
+                raise InputError(f"mask: expected shape ({len(self)},), got {mask.shape}")
+            rows = np.flatnonzero(mask)
+        index = self._checked_rows(rows)
+        return Catalogue(
+            ids=self.ids[index],
+            names=[self.names[row] for row in index],
+            epoch_mjd2000=self.epoch_mjd2000[index],
+            elements=self.elements[index],
+            source=self.source,
+        )
+
+    def _checked_rows(self, rows: ArrayLike) -> NDArray[np.int64]:
+        index = _integers("rows", rows)
+        if len(index) and not (index.min() >= 0 and index.max() < len(self)):
+            bad = index[(index < 0) | (index >= len(self))][0]
+            raise InputError(f"row {bad} is not in {self.source}: expected 0 to {len(self) - 1}")
+        return index
+
+    @cached_property
+    def _mean_motion(self) -> NDArray[np.float64]:
+        """(n,) rad/s, Kepler's third law with the Sun's mu."""
+        a = self.elements[:, 0]
+        result: NDArray[np.float64] = np.sqrt(MU_SUN / a) / a
+        return result
+
+    @cached_property
+    def _id_index(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        order = np.argsort(self.ids, kind="stable").astype(np.int64)
+        return order, self.ids[order]
+
+    @cached_property
+    def _orbits(self) -> NDArray[np.float64]:
+        """(n, 10), packed for the kernel."""
+        from feasibility.orbits import catalogue_kernels as columns
+
+        along, across = perifocal_axes(self.elements)
+        packed = np.empty((len(self), columns.N_COLUMNS))
+        packed[:, columns.ECCENTRICITY] = self.elements[:, 1]
+        packed[:, columns.MEAN_ANOMALY] = self.elements[:, 5]
+        packed[:, columns.MEAN_MOTION] = self._mean_motion
+        packed[:, columns.EPOCH] = self.epoch_mjd2000
+        packed[:, columns.AXIS_A : columns.AXIS_A + 3] = along
+        packed[:, columns.AXIS_B : columns.AXIS_B + 3] = across
+        return packed
+
+
+def _integers(what: str, values: ArrayLike) -> NDArray[np.int64]:
+    array = np.atleast_1d(np.asarray(values))
+    if array.size == 0:
+        array = array.astype(np.int64)
+    if array.ndim != 1 or array.dtype.kind not in "iu":
+        raise InputError(
+            f"{what}: expected integers of shape (k,), got {array.dtype} of shape {array.shape}"
+        )
+    return np.array(array, dtype=np.int64)
+
+
+def _check_distinct(ids: NDArray[np.int64]) -> None:
+    values, counts = np.unique(ids, return_counts=True)
+    if (counts > 1).any():
+        twice = values[int(np.argmax(counts > 1))]
+        raise InputError(f"Catalogue ids: {twice} occurs more than once")
+
+
+def _check_orbits(epochs: NDArray[np.float64], elements: NDArray[np.float64]) -> None:
+    finite = np.isfinite(elements).all(axis=1) & np.isfinite(epochs)
+    if not finite.all():
+        row = int(np.argmin(finite))
+        raise InputError(f"Catalogue, row {row}: an element or the epoch is not finite")
+    a, e = elements[:, 0], elements[:, 1]
+    bound = (a > 0) & (e >= 0) & (e < 1)
+    if not bound.all():
+        row = int(np.argmin(bound))
+        raise InputError(
+            f"Catalogue, row {row}: a = {a[row]:g} m, e = {e[row]:g} is not an ellipse; "
+            "expected a > 0 and 0 <= e < 1"
+        )
