@@ -1,6 +1,7 @@
 """`LegSolutions`: what every leg solver returns, one row a leg."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
 from enum import IntEnum
 from typing import Final, Self, final
 
@@ -76,18 +77,28 @@ class LegSolutions:
 
     def take(self, rows: NDArray[np.intp] | NDArray[np.bool_]) -> Self:
         """Return the solutions at the given rows (indices or a boolean mask)."""
-        return type(self)(
+        return type(self)(*(getattr(self, field.name)[rows] for field in fields(self)))
+
+    @classmethod
+    def concatenate(cls, parts: Sequence["LegSolutions"]) -> "LegSolutions":
+        """Return the rows of all parts (at least one, of equal segment counts), in order."""
+        return cls(
             *(
-                getattr(self, name)[rows]
-                for name in (
-                    "throttles",
-                    "m0",
-                    "m_final",
-                    "mismatch",
-                    "converged",
-                    "status",
-                    "start",
-                    "seconds",
-                )
+                np.concatenate([getattr(part, field.name) for part in parts])
+                for field in fields(cls)
             )
+        )
+
+    @classmethod
+    def unsolved(cls, n_legs: int, n_segments: int) -> "LegSolutions":
+        """Return `n_legs` rows that are not converged, for a solver to fill in."""
+        return cls(
+            throttles=np.full((n_legs, n_segments, 3), np.nan),
+            m0=np.zeros(n_legs),
+            m_final=np.zeros(n_legs),
+            mismatch=np.full(n_legs, np.inf),
+            converged=np.zeros(n_legs, dtype=np.bool_),
+            status=np.full(n_legs, Status.NOT_CONVERGED, dtype=np.int8),
+            start=np.full(n_legs, -1, dtype=np.int16),
+            seconds=np.zeros(n_legs),
         )
