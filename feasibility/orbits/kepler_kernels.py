@@ -89,12 +89,20 @@ def _first_guess(dt, r0, eta0, beta, mu):
         sigma = e_cos * math.sin(y) + e_sin * math.cos(y)
         e = math.sqrt(e_cos * e_cos + e_sin * e_sin)
         return (y + math.copysign(0.85 * e, sigma)) / k
-    # The three positive terms bound s from above where eta0 >= 0; the logarithm
-    # takes over where the hyperbola is long.
     guess = min(tau, np.cbrt(6.0 * dt / mu))
     if beta < 0.0:
+        # Hyperbolic anomalies at both ends, the final one by the logarithm that bounds it;
+        # without it an inbound hyperbola starts far beyond the solution and overflows.
         k = math.sqrt(-beta)
-        guess = min(guess, (2.0 + math.log1p(dt * k * k * k / mu)) / k)
+        e_cosh = 1.0 - r0 * beta / mu
+        e_sinh = eta0 * k / mu
+        inward = max(e_cosh - e_sinh, _EPS * e_cosh)
+        outward = max(e_cosh + e_sinh, _EPS * e_cosh)
+        e = math.sqrt(inward * outward)
+        anomaly = 0.5 * math.log(outward / inward)
+        mean = e_sinh - anomaly - dt * beta * k / mu
+        final = math.copysign(math.log(2.0 * abs(mean) / e + 1.8), mean)
+        guess = max(final - anomaly, 0.01 * k * guess) / k
     return guess
 
 
@@ -132,7 +140,7 @@ def solve_kepler(dt, r0, eta0, beta, mu):
     for _ in range(_MAX_ITERATIONS):
         g1, g2, g3 = g_functions(s, beta)
         gap = r0 * g1 + eta0 * g2 + mu * g3 - dt
-        if abs(gap) <= _EPS * (dt + abs(eta0 * g2)):
+        if abs(gap) <= _EPS * dt:
             break
         if gap > 0.0:
             high = s
@@ -150,7 +158,7 @@ def solve_kepler(dt, r0, eta0, beta, mu):
         s = s - 5.0 * gap / (slope + 2.0 * root)
         if not (low < s < high):
             s = 0.5 * (low + high) if high < np.inf else 2.0 * previous
-        if abs(s - previous) <= 2.0 * _EPS * s:
+        if abs(s - previous) <= 2.0 * _EPS * s or low >= high * (1.0 - 2.0 * _EPS):
             g1, g2, g3 = g_functions(s, beta)
             break
     s = sign * s
