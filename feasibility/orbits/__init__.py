@@ -14,7 +14,9 @@ from feasibility.orbits.elements import (
     equinoctial_to_cartesian,
     equinoctial_to_classical,
 )
-from feasibility.orbits.neighbours import OrbitalNeighbours
+from feasibility.orbits.neighbours import OrbitalNeighbours, orbital_metric
+from feasibility.orbits.synthetic import synthetic_main_belt
+from feasibility.orbits.tables import read_catalogue
 
 __all__ = [
     "Catalogue",
@@ -26,4 +28,7 @@ __all__ = [
     "earth",
     "equinoctial_to_cartesian",
     "equinoctial_to_classical",
+    "orbital_metric",
+    "read_catalogue",
+    "synthetic_main_belt",
 ]

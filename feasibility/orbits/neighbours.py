@@ -15,7 +15,7 @@ _MAX_TREES: Final = 64
 """Trees kept at a time: 5 years of 30-day buckets, 400 MB for 83 000 bodies."""
 
 
-def orbital_metric_points(states: ArrayLike, reference_tof_days: float) -> NDArray[np.float64]:
+def orbital_metric(states: ArrayLike, reference_tof_days: float) -> NDArray[np.float64]:
     """Map states to points whose Euclidean distance is the orbital metric.
 
     The point of a state (r, v) is (r/T + v, r/T). The two halves of a
@@ -53,7 +53,7 @@ class OrbitalNeighbours:
     catalogue : Catalogue
         The bodies, at least two.
     reference_tof_days : float
-        Duration T of the metric in days, see `orbital_metric_points`.
+        Duration T of the metric in days, see `orbital_metric`.
     bucket_days : float
         Width of an epoch bucket in days.
 
@@ -129,7 +129,7 @@ class OrbitalNeighbours:
         tree = self._trees.get(bucket)
         if tree is None:
             states = self._catalogue.states(bucket * self._bucket_days)
-            tree = cKDTree(orbital_metric_points(states, self._reference_tof_days))
+            tree = cKDTree(orbital_metric(states, self._reference_tof_days))
             self._trees[bucket] = tree
             if len(self._trees) > _MAX_TREES:
                 self._trees.popitem(last=False)
