@@ -41,15 +41,16 @@ class LegSolutions:
     throttles : (n, s, 3) float64
         Throttle vectors, norm at most 1, heliocentric frame; NaN where not converged.
     m0 : (n,) float64, kg
-        Initial mass: the maximum initial mass m* or the given one. For a
-        maximum-initial-mass solve 0 where not converged.
+        Initial mass: the maximum initial mass m* or the given one; 0 where not
+        converged.
     m_final : (n,) float64, kg
         Final mass; 0 where not converged.
     mismatch : (n,) float64
         Largest absolute mismatch at the match point, in units of AU,
         `constants.EARTH_VELOCITY` and `m0`; inf where not converged.
     converged : (n,) bool
-        Closed to `MISMATCH_TOLERANCE` with throttles at most 1 + `THROTTLE_TOLERANCE`.
+        Where `status` is `Status.CONVERGED`: closed to `MISMATCH_TOLERANCE` with throttles
+        at most 1 + `THROTTLE_TOLERANCE`, and for minimum propellant not below the dry mass.
     status : (n,) int8
         `Status` values.
     start : (n,) int16
@@ -73,7 +74,7 @@ class LegSolutions:
     @property
     def n_segments(self) -> int:
         """Number of segments, s."""
-        return self.throttles.shape[1]
+        return int(self.throttles.shape[1])
 
     def take(self, rows: NDArray[np.intp] | NDArray[np.bool_]) -> Self:
         """Return the solutions at the given rows (indices or a boolean mask)."""
@@ -101,4 +102,63 @@ class LegSolutions:
             status=np.full(n_legs, Status.NOT_CONVERGED, dtype=np.int8),
             start=np.full(n_legs, -1, dtype=np.int16),
             seconds=np.zeros(n_legs),
+        )
+
+
+@final
+class SolutionRows:
+    """Collects the rows of a `LegSolutions` as a solver finds them; the rest stays failed.
+
+    Parameters
+    ----------
+    n : int
+        Number of legs.
+    n_segments : int
+        Segments of each leg, s.
+
+    Attributes
+    ----------
+    status : (n,) int8
+        `Status` values, writable; `Status.NOT_CONVERGED` at first.
+    seconds : (n,) float64
+        Processor time, writable.
+    """
+
+    def __init__(self, n: int, n_segments: int) -> None:
+        self.status = np.full(n, Status.NOT_CONVERGED, dtype=np.int8)
+        self.seconds = np.zeros(n)
+        self._throttles = np.full((n, n_segments, 3), np.nan)
+        self._m0 = np.zeros(n)
+        self._m_final = np.zeros(n)
+        self._mismatch = np.full(n, np.inf)
+        self._start = np.full(n, -1, dtype=np.int16)
+
+    def put(
+        self,
+        row: int,
+        throttles: NDArray[np.float64],
+        m0: float,
+        m_final: float,
+        mismatch: float,
+        start: int,
+    ) -> None:
+        """Set one row to a closed leg, replacing what was there."""
+        self._throttles[row] = throttles
+        self._m0[row] = m0
+        self._m_final[row] = m_final
+        self._mismatch[row] = mismatch
+        self._start[row] = start
+        self.status[row] = Status.CONVERGED
+
+    def solutions(self) -> LegSolutions:
+        """Return what was collected."""
+        return LegSolutions(
+            throttles=self._throttles,
+            m0=self._m0,
+            m_final=self._m_final,
+            mismatch=self._mismatch,
+            converged=self.status == Status.CONVERGED,
+            status=self.status,
+            start=self._start,
+            seconds=self.seconds,
         )

@@ -1,0 +1,12 @@
+"""Sims-Flanagan legs: the reference solver (pykep and pygmo) and what every solver returns."""
+
+from feasibility.sims_flanagan.solutions import LegSolutions, Status
+from feasibility.sims_flanagan.solve import max_initial_mass, optimise, solve_max_initial_mass
+
+__all__ = [
+    "LegSolutions",
+    "Status",
+    "max_initial_mass",
+    "optimise",
+    "solve_max_initial_mass",
+]

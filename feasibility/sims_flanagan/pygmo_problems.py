@@ -1,0 +1,178 @@
+"""The two optimisation problems of the reference solver, as pygmo problems over pykep's leg.
+
+Decision vector: the throttles (3 s numbers), the initial mass (only where it
+is free) and the final mass. Constraints: 7 mismatches are zero, s throttles
+have a norm of at most 1. The gradients are exact, from pykep's leg.
+"""
+
+from typing import Any, Final, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+Vector = NDArray[np.float64]
+
+_MASS_BOUNDS: Final = (1e-3, 1e3)
+_LEAST_THROTTLE: Final = 1e-10
+
+
+class _Cache:
+    """Remembers the last point: pygmo asks for it again for objective and constraints."""
+
+    def __init__(self) -> None:
+        self._point = b""
+        self._value: Any = None
+
+    def get(self, point: bytes) -> Any:
+        return self._value if point == self._point else None
+
+    def put(self, point: bytes, value: Any) -> Any:
+        self._point, self._value = point, value
+        return value
+
+
+class _LegProblem:
+    """What the two problems share: constraints, bounds, sparsity and the caches."""
+
+    n_masses: int
+
+    def __init__(self, leg: Any) -> None:
+        self.leg = leg
+        self.n_segments: int = leg.nseg
+        self._fitness = _Cache()
+        self._gradient = _Cache()
+
+    def get_nec(self) -> int:
+        """Return the number of equality constraints."""
+        return 7
+
+    def get_nic(self) -> int:
+        """Return the number of inequality constraints."""
+        return self.n_segments
+
+    def get_bounds(self) -> tuple[list[float], list[float]]:
+        """Return lower and upper bounds of the decision vector."""
+        n_throttles = 3 * self.n_segments
+        lower, upper = _MASS_BOUNDS
+        return (
+            [-1.0] * n_throttles + [lower] * self.n_masses,
+            [1.0] * n_throttles + [upper] * self.n_masses,
+        )
+
+    def fitness(self, x: Vector) -> list[float]:
+        """Return objective, mismatches and throttle constraints."""
+        point = x.tobytes()
+        known: list[float] | None = self._fitness.get(point)
+        if known is not None:
+            return known
+        leg = self._leg_at(x)
+        value = [
+            self._objective(x),
+            *leg.compute_mismatch_constraints(),
+            *leg.compute_throttle_constraints(),
+        ]
+        fitness: list[float] = self._fitness.put(point, value)
+        return fitness
+
+    def gradient(self, x: Vector) -> Vector:
+        """Return the non-zero gradients in the order of `gradient_sparsity`."""
+        point = x.tobytes()
+        known: Vector | None = self._gradient.get(point)
+        if known is not None:
+            return known
+        wrt_start, wrt_end, wrt_throttles = self._leg_at(x).compute_mc_grad()
+        n_throttles = 3 * self.n_segments
+        mismatch = np.empty((7, n_throttles + self.n_masses))
+        mismatch[:, :n_throttles] = wrt_throttles[:, :n_throttles]
+        if self.n_masses == 2:
+            mismatch[:, -2] = wrt_start[:, 6]
+        mismatch[:, -1] = wrt_end[:, 6]
+        # |u|^2 - 1 depends on the three components of its own throttle only.
+        value = np.concatenate(
+            ([self._objective_slope(x)], mismatch.ravel(), 2.0 * x[:n_throttles])
+        )
+        gradient: Vector = self._gradient.put(point, value)
+        return gradient
+
+    def gradient_sparsity(self) -> NDArray[np.int64]:
+        """Return the (row, column) pairs of the non-zero gradients."""
+        n_throttles = 3 * self.n_segments
+        width = n_throttles + self.n_masses
+        mismatch = [(1 + row, column) for row in range(7) for column in range(width)]
+        throttles = [(8 + column // 3, column) for column in range(n_throttles)]
+        return np.array([(0, self._objective_column()), *mismatch, *throttles])
+
+    def _leg_at(self, x: Vector) -> Any:
+        throttles = x[: 3 * self.n_segments]
+        # The gradient of a norm is not defined at zero, where pykep returns NaN.
+        if not throttles.reshape(-1, 3).any(axis=1).all():
+            throttles = np.where(throttles == 0.0, _LEAST_THROTTLE, throttles)
+        self.leg.throttles = throttles
+        self._set_masses(x)
+        return self.leg
+
+    def _set_masses(self, x: Vector) -> None:
+        raise NotImplementedError
+
+    def _objective(self, x: Vector) -> float:
+        raise NotImplementedError
+
+    def _objective_slope(self, x: Vector) -> float:
+        raise NotImplementedError
+
+    def _objective_column(self) -> int:
+        raise NotImplementedError
+
+
+@final
+class MaximumMassProblem(_LegProblem):
+    """Largest initial mass of a leg: x = throttles, initial mass, final mass.
+
+    The objective is 1 / initial mass, because mass enters the motion as
+    1 / mass only: the problem is closer to linear, and converges from more
+    starts, than with the mass itself.
+
+    Parameters
+    ----------
+    leg : pykep.leg.sims_flanagan
+        The leg in scaled units; its mass unit should be near the answer.
+    """
+
+    n_masses = 2
+
+    def _set_masses(self, x: Vector) -> None:
+        self.leg.ms, self.leg.mf = x[-2], x[-1]
+
+    def _objective(self, x: Vector) -> float:
+        return 1.0 / float(x[-2])
+
+    def _objective_slope(self, x: Vector) -> float:
+        return -1.0 / float(x[-2]) ** 2
+
+    def _objective_column(self) -> int:
+        return 3 * self.n_segments
+
+
+@final
+class MinimumPropellantProblem(_LegProblem):
+    """Largest final mass at the leg's own initial mass: x = throttles, final mass.
+
+    Parameters
+    ----------
+    leg : pykep.leg.sims_flanagan
+        The leg in scaled units, with its initial mass set.
+    """
+
+    n_masses = 1
+
+    def _set_masses(self, x: Vector) -> None:
+        self.leg.mf = x[-1]
+
+    def _objective(self, x: Vector) -> float:
+        return -float(x[-1])
+
+    def _objective_slope(self, x: Vector) -> float:  # noqa: ARG002
+        return -1.0
+
+    def _objective_column(self) -> int:
+        return 3 * self.n_segments

@@ -1,0 +1,249 @@
+"""The reference leg solver: pykep's leg, optimised with pygmo (IPOPT and SLSQP).
+
+Slow, plain and independent of the fast solver, which it checks and backs up.
+"""
+
+import functools
+import time
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.errors import InputError
+from feasibility.legs import Legs
+from feasibility.sims_flanagan.pygmo_problems import MaximumMassProblem, MinimumPropellantProblem
+from feasibility.sims_flanagan.pykep_leg import CUT, N_SEGMENTS, confirm, scaled_leg
+from feasibility.sims_flanagan.solutions import (
+    MISMATCH_TOLERANCE,
+    THROTTLE_TOLERANCE,
+    LegSolutions,
+    SolutionRows,
+    Status,
+)
+from feasibility.sims_flanagan.starts import lambert_starts, random_starts, tangential_starts
+
+_MASS_ROUNDING = 1e-6
+_LEAST_IMPULSE = 1e-9
+
+
+def reference_max_initial_mass(
+    legs: Legs,
+    *,
+    n_segments: int = N_SEGMENTS,
+    rng: np.random.Generator | None = None,
+    n_random: int = 0,
+) -> LegSolutions:
+    """Find the maximum initial mass m* of each leg: the best of several starts of IPOPT.
+
+    The starts are every Lambert branch up to 2 revolutions, thrust along and
+    against the velocity, and `n_random` smooth random ones. Neither the legs'
+    `m0` nor `m_dry` plays a part.
+
+    Parameters
+    ----------
+    legs : Legs
+        n legs.
+    n_segments : int
+        Segments of the leg, at least 2.
+    rng : numpy.random.Generator, optional
+        Source of the random starts.
+    n_random : int
+        Random starts of each leg; needs `rng`.
+
+    Returns
+    -------
+    LegSolutions
+        n rows; `start` is 0 to 4 for the Lambert branches (0 revolutions, then
+        low and high path of 1 and 2), 5 along and 6 against the velocity, from
+        7 the random ones.
+
+    Raises
+    ------
+    InputError
+        `n_segments` is below 2, or random starts are asked for without `rng`.
+    MissingDependencyError
+        pykep or pygmo is not installed.
+    """
+    _check_segments(n_segments)
+    if n_random and rng is None:
+        raise InputError("reference_max_initial_mass: n_random needs rng, a numpy Generator")
+    rows = SolutionRows(len(legs), n_segments)
+    for row in range(len(legs)):
+        began = time.process_time()
+        leg = scaled_leg(legs, row, float(legs.m0[row]), n_segments)
+        best_mass = 0.0
+        for start, impulses in _starts(leg, n_segments, n_random, rng):
+            found = _maximise_mass(legs, row, impulses)
+            if found is not None and found[1] > best_mass:
+                best_mass = found[1]
+                rows.put(row, *found, start)
+        rows.seconds[row] = time.process_time() - began
+    return rows.solutions()
+
+
+def _starts(
+    leg: Any, n_segments: int, n_random: int, rng: np.random.Generator | None
+) -> Iterator[tuple[int, NDArray[np.float64]]]:
+    yield from lambert_starts(leg, n_segments)
+    yield from tangential_starts(leg, n_segments)
+    if rng is not None:
+        yield from random_starts(leg, n_segments, n_random, rng)
+
+
+def _maximise_mass(
+    legs: Legs, row: int, impulses: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], float, float, float] | None:
+    """Return throttles, m0, m_final and mismatch from one start, None if it does not close."""
+    n_segments = len(impulses)
+    leg = scaled_leg(legs, row, float(legs.m0[row]), n_segments)
+    masses, final = _mass_profile(impulses, leg.veff)
+    pushes = np.maximum(np.linalg.norm(impulses, axis=1), _LEAST_IMPULSE) * masses
+    # The mass at which the guess uses full thrust on average is the mass unit: m0 near 1.
+    mass_unit = float(legs.m0[row] * leg.max_thrust * leg.tof / n_segments / pushes.mean())
+    throttles = impulses * (masses / pushes.mean())[:, None]
+    throttles /= np.maximum(1.0, np.linalg.norm(throttles, axis=1, keepdims=True))
+    leg = scaled_leg(legs, row, mass_unit, n_segments)
+    guess = np.concatenate([throttles.ravel(), [1.0, final]])
+    x = _evolve(MaximumMassProblem(leg), guess, _ipopt())
+    return _confirmed(legs, row, x[:-2], float(x[-2]) * mass_unit, float(x[-1]) * mass_unit)
+
+
+def _mass_profile(
+    impulses: NDArray[np.float64], exhaust_velocity: float
+) -> tuple[NDArray[np.float64], float]:
+    """Return the masses the thrust acts on (pykep's convention) and the final mass; m0 is 1."""
+    after = np.exp(-np.cumsum(np.linalg.norm(impulses, axis=1)) / exhaust_velocity)
+    before = np.concatenate([[1.0], after[:-1]])
+    n_forward = int(len(impulses) * CUT)
+    masses = np.concatenate([before[:n_forward], after[n_forward:]])
+    return masses, float(after[-1])
+
+
+def reference_min_propellant(
+    legs: Legs, *, guess: LegSolutions | None = None, n_segments: int = N_SEGMENTS
+) -> LegSolutions:
+    """Find the largest final mass of each leg at the leg's own initial mass.
+
+    The start is the maximum-initial-mass solution: as only thrust / mass
+    enters the motion, its throttles times m0 / m* close the leg at m0 exactly.
+    Each row is then improved by SLSQP, and by IPOPT where that fails; the
+    start itself remains where both do.
+
+    Parameters
+    ----------
+    legs : Legs
+        n legs.
+    guess : LegSolutions, optional
+        Closed solutions of the same legs at the same or a larger initial mass, as
+        returned by a maximum-initial-mass solver; found here if not given.
+    n_segments : int
+        Segments of the leg, at least 2; those of `guess` if that is given.
+
+    Returns
+    -------
+    LegSolutions
+        n rows; `start` is that of the guess. A leg whose initial mass exceeds
+        that of the guess is `Status.TOO_HEAVY` without a solve; one that needs
+        more propellant than there is is `Status.BELOW_DRY_MASS`.
+
+    Raises
+    ------
+    InputError
+        `n_segments` is below 2, or `guess` has another number of rows.
+    MissingDependencyError
+        pykep or pygmo is not installed.
+    """
+    _check_segments(n_segments)
+    if guess is None:
+        guess = reference_max_initial_mass(legs, n_segments=n_segments)
+    if len(guess) != len(legs):
+        raise InputError(f"reference_min_propellant: {len(guess)} guesses for {len(legs)} legs")
+    rows = SolutionRows(len(legs), guess.n_segments)
+    for row in np.flatnonzero(guess.converged):
+        began = time.process_time()
+        if legs.m0[row] > guess.m0[row] * (1.0 + _MASS_ROUNDING):
+            rows.status[row] = Status.TOO_HEAVY
+        else:
+            found = _minimise_propellant(legs, int(row), guess)
+            if found is not None and found[2] < legs.m_dry[row]:
+                rows.status[row] = Status.BELOW_DRY_MASS
+            elif found is not None:
+                rows.put(int(row), *found, int(guess.start[row]))
+        rows.seconds[row] = time.process_time() - began
+    return rows.solutions()
+
+
+def _minimise_propellant(
+    legs: Legs, row: int, guess: LegSolutions
+) -> tuple[NDArray[np.float64], float, float, float] | None:
+    m0 = float(legs.m0[row])
+    lighter = m0 / float(guess.m0[row])
+    throttles = guess.throttles[row].ravel() * lighter
+    m_final = float(guess.m_final[row]) * lighter
+    best = _confirmed(legs, row, throttles, m0, m_final)
+    x0 = np.concatenate([throttles, [m_final / m0]])
+    for algorithm in (_slsqp(), _ipopt()):
+        # The dry mass is compared with the optimum and is no bound of the problem:
+        # as a bound it would make "needs too much propellant" look like "did not converge".
+        leg = scaled_leg(legs, row, m0, guess.n_segments)
+        x = _evolve(MinimumPropellantProblem(leg), x0, algorithm)
+        found = _confirmed(legs, row, x[:-1], m0, float(x[-1]) * m0)
+        if found is not None and (best is None or found[2] > best[2]):
+            return found
+    return best
+
+
+def _check_segments(n_segments: int) -> None:
+    if n_segments < 2:
+        raise InputError(f"n_segments: {n_segments}, expected at least 2")
+
+
+def _confirmed(
+    legs: Legs, row: int, throttles: NDArray[np.float64], m0: float, m_final: float
+) -> tuple[NDArray[np.float64], float, float, float] | None:
+    """Return the solution with throttles cut to 1, if pykep's leg confirms it."""
+    vectors = throttles.reshape(-1, 3)
+    norms = np.linalg.norm(vectors, axis=1, keepdims=True)
+    if not np.isfinite(norms).all() or norms.max() > 1.0 + THROTTLE_TOLERANCE:
+        return None
+    vectors = vectors / np.maximum(norms, 1.0)
+    mismatch = confirm(legs.take([row]), vectors[None], np.array([m0]), np.array([m_final])).item()
+    return (vectors, m0, m_final, mismatch) if mismatch < MISMATCH_TOLERANCE else None
+
+
+def _evolve(problem: Any, guess: NDArray[np.float64], algorithm: Any) -> NDArray[np.float64]:
+    import pygmo
+
+    wrapped = pygmo.problem(problem)
+    # pygmo keeps the guess unless the result is better under these tolerances.
+    wrapped.c_tol = [MISMATCH_TOLERANCE] * 7 + [2.0 * THROTTLE_TOLERANCE] * problem.n_segments
+    lower, upper = wrapped.get_bounds()
+    population = pygmo.population(wrapped)
+    population.push_back(np.clip(guess, lower, upper))
+    x: NDArray[np.float64] = algorithm.evolve(population).get_x()[0]
+    return x
+
+
+@functools.cache
+def _ipopt() -> Any:
+    import pygmo
+
+    solver = pygmo.ipopt()
+    solver.set_string_options({"sb": "yes"})
+    solver.set_integer_options({"print_level": 0, "max_iter": 200})
+    # An objective to 5 digits is enough; the constraints have to be far below the tolerance.
+    solver.set_numeric_options({"tol": 1e-5, "constr_viol_tol": 1e-7})
+    return pygmo.algorithm(solver)
+
+
+@functools.cache
+def _slsqp() -> Any:
+    import pygmo
+
+    solver = pygmo.nlopt("slsqp")
+    solver.maxeval = 200
+    solver.ftol_rel = 1e-6
+    solver.xtol_rel = 0.0
+    return pygmo.algorithm(solver)
