@@ -1,0 +1,39 @@
+# Everything here sets itself up: on a fresh machine Python 3.11 or newer and make are enough.
+PYTHON ?= python3
+BIN := .venv/bin
+DEMO_RUN := runs/demo
+
+.PHONY: demo test lint slow clean
+
+demo: .venv/.run
+	rm -rf $(DEMO_RUN)
+	$(BIN)/seqsearch run demo --seed 1 --out $(DEMO_RUN)
+	$(BIN)/seqsearch verify $(DEMO_RUN)
+
+test: lint
+	$(BIN)/pytest -q -m "not slow" -n 2 --dist loadfile
+
+slow: .venv/.dev
+	$(BIN)/pytest -q -m slow
+
+lint: .venv/.dev
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+clean:
+	rm -rf .venv build *.egg-info
+
+.venv/bin/python:
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' \
+		|| { echo "Python 3.11 or newer is needed; try: make PYTHON=python3.12 $(MAKECMDGOALS)"; exit 1; }
+	$(PYTHON) -m venv .venv
+
+.venv/.run: pyproject.toml | .venv/bin/python
+	$(BIN)/pip install --quiet --disable-pip-version-check -e .
+	touch $@
+
+.venv/.dev: pyproject.toml | .venv/bin/python
+	$(BIN)/pip install --quiet --disable-pip-version-check -e ".[dev]"
+	touch $@ .venv/.run

@@ -1,0 +1,169 @@
+"""The command ``seqsearch``."""
+
+import argparse
+import re
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Final
+
+from feasibility import InputError, MissingDependencyError
+
+_DESCRIPTION: Final = """\
+Find asteroid tours for a low-thrust spacecraft.
+
+A beam search proposes legs to near neighbours in a catalogue of asteroids, a
+pruner drops those that cannot be flown, and the rest are optimised in the
+Sims-Flanagan model.
+
+  seqsearch run demo                      a synthetic belt; needs no file
+  seqsearch run gtoc7 --catalogue FILE    one GTOC7 probe on the official table
+  seqsearch verify runs/demo              check the result independently
+"""
+
+_RUN: Final = """\
+Search for the tour with the most visits and write it to a run folder.
+
+The folder gets config.toml (everything that was set), provenance.json (seed,
+versions), counters.csv (what was proposed, pruned, optimised and feasible at
+each rank), sequence.json (the tour with every impulse) and sequence.csv (its
+legs). It is rewritten after each rank: interrupt the run, or give a time
+limit, and the best tour so far is there.
+
+The same seed gives the same tour with any number of workers, unless a time
+limit cuts the search short.
+"""
+
+_UNITS_S: Final = {"": 1.0, "s": 1.0, "sec": 1.0, "min": 60.0, "m": 60.0, "h": 3600.0}
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line and return the exit code.
+
+    0: done (and, for ``verify``, everything holds); 1: verification failed;
+    2: input that cannot be used, with one line on stderr.
+    """
+    parsed = _parser().parse_args(arguments)
+    try:
+        return int(parsed.run(parsed))
+    except (InputError, MissingDependencyError) as error:
+        print(f"seqsearch: {error}", file=sys.stderr)
+        return 2
+
+
+def _parser() -> argparse.ArgumentParser:
+    raw = argparse.RawDescriptionHelpFormatter
+    parser = argparse.ArgumentParser(
+        prog="seqsearch", description=_DESCRIPTION, formatter_class=raw
+    )
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+
+    run = commands.add_parser(
+        "run", help="search for a tour", description=_RUN, formatter_class=raw
+    )
+    run.add_argument("problem", help="name of a built-in problem, or a TOML file")
+    run.add_argument("--catalogue", metavar="FILE", help="asteroid table (GTOC2, 4, 5, 7, 11)")
+    run.add_argument("--out", metavar="DIR", help="run folder (default: runs/PROBLEM)")
+    run.add_argument("--seed", type=int, default=0, help="seed of the search (default: 0)")
+    run.add_argument(
+        "--time-limit", metavar="T", help="stop after 90s, 10min, 1h; passes go on until then"
+    )
+    run.add_argument("--workers", type=int, help="processes (default: one a core)")
+    run.add_argument("--beam-width", type=int, metavar="N", help="nodes kept at each rank")
+    run.add_argument("--passes", type=int, metavar="N", help="beams run one after another")
+    run.add_argument(
+        "--pruner", metavar="SPEC", help="such as lambert:1.3,mima2:0.97, or none to keep all"
+    )
+    run.add_argument("--solver", choices=("fast", "reference"), help="leg solver")
+    run.set_defaults(run=_run)
+
+    verify = commands.add_parser(
+        "verify",
+        help="check a tour independently",
+        description=(
+            "Integrate every leg of a run's tour with scipy's DOP853 between impulses and check "
+            "end states (1000 km, 1 m/s), throttles, masses, stays, duplicates, window and "
+            "duration. Exit code 0 if all hold, 1 if not."
+        ),
+    )
+    verify.add_argument("path", metavar="RUN", help="run folder, or a sequence.json")
+    verify.add_argument(
+        "--catalogue", metavar="FILE", help="also compare the elements with this table"
+    )
+    verify.set_defaults(run=_verify)
+
+    problems = commands.add_parser(
+        "problems",
+        help="show the built-in problems",
+        description=(
+            "List the built-in problems, or print one as TOML: the starting point for a problem "
+            "file of your own."
+        ),
+    )
+    problems.add_argument("name", nargs="?", help="print this one as TOML")
+    problems.set_defaults(run=_problems)
+    return parser
+
+
+def _run(options: argparse.Namespace) -> int:
+    from seqsearch.command_run import run_search
+
+    return run_search(
+        options.problem,
+        catalogue=options.catalogue,
+        out=None if options.out is None else Path(options.out),
+        seed=options.seed,
+        time_limit_s=None if options.time_limit is None else parse_duration(options.time_limit),
+        workers=options.workers,
+        overrides={
+            "beam_width": options.beam_width,
+            "passes": options.passes,
+            "pruner": options.pruner,
+            "solver": options.solver,
+        },
+    )
+
+
+def _verify(options: argparse.Namespace) -> int:
+    from feasibility.orbits import read_catalogue
+    from seqsearch.run_folder import SEQUENCE
+    from seqsearch.tour import read_tour
+    from seqsearch.verify import verify_tour
+
+    path = Path(options.path)
+    tour = read_tour(path / SEQUENCE if path.is_dir() else path)
+    catalogue = None if options.catalogue is None else read_catalogue(Path(options.catalogue))
+    verification = verify_tour(tour, catalogue)
+    print(tour.one_line())
+    print(tour.summary())
+    print(verification.table())
+    print("verified" if verification.passed else "NOT verified")
+    return 0 if verification.passed else 1
+
+
+def _problems(options: argparse.Namespace) -> int:
+    from seqsearch.config import builtin_problems, read_config
+
+    texts = builtin_problems()
+    if options.name is None:
+        for name in texts:
+            print(f"{name:<12} {read_config(name).problem.description}")
+        return 0
+    if options.name not in texts:
+        raise InputError(f"{options.name}: no such problem; known are {', '.join(texts)}")
+    print(texts[options.name], end="")
+    return 0
+
+
+def parse_duration(text: str) -> float:
+    """Return a duration such as ``90s``, ``10min``, ``1.5h`` or ``600`` in seconds.
+
+    Raises
+    ------
+    InputError
+        Not a positive number with one of these units.
+    """
+    match = re.fullmatch(r"\s*([0-9]*\.?[0-9]+)\s*([a-z]*)\s*", text)
+    if match is None or match[2] not in _UNITS_S or float(match[1]) <= 0:
+        raise InputError(f"--time-limit {text!r}: expected a duration such as 90s, 10min or 1h")
+    return float(match[1]) * _UNITS_S[match[2]]

@@ -1,0 +1,227 @@
+"""What a problem's TOML file may say, and how it becomes a `Problem` and `SearchSettings`."""
+
+from importlib import resources
+from pathlib import Path
+from typing import Annotated, Any, final
+
+import msgspec
+import numpy as np
+import tomli_w
+from msgspec import Meta
+
+from feasibility import InputError, Spacecraft
+from feasibility.constants import mjd_to_mjd2000
+from feasibility.orbits import Catalogue, read_catalogue, synthetic_main_belt
+from seqsearch.problem import Problem
+from seqsearch.settings import SearchSettings
+
+
+class _Table(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A TOML table in which every key is known."""
+
+
+@final
+class ProblemTable(_Table, frozen=True, kw_only=True):
+    """Table ``[problem]``."""
+
+    name: str
+    description: str = ""
+
+
+@final
+class SpacecraftTable(_Table, frozen=True, kw_only=True):
+    """Table ``[spacecraft]``."""
+
+    wet_mass_kg: float
+    dry_mass_kg: float
+    thrust_n: float
+    isp_s: float
+
+
+@final
+class MissionTable(_Table, frozen=True, kw_only=True):
+    """Table ``[mission]``."""
+
+    first_departure_mjd: tuple[float, float]
+    max_duration_days: float
+    min_stay_days: float = 0.0
+    start_ids: tuple[int, ...] = ()
+
+
+@final
+class CatalogueTable(_Table, frozen=True, kw_only=True):
+    """Table ``[catalogue]``: a file, or a synthetic belt, or neither (then --catalogue)."""
+
+    file: str | None = None
+    synthetic_bodies: Annotated[int, Meta(ge=2)] | None = None
+    synthetic_seed: Annotated[int, Meta(ge=0)] = 0
+
+
+@final
+class Config(_Table, frozen=True, kw_only=True):
+    """A whole problem file."""
+
+    problem: ProblemTable
+    spacecraft: SpacecraftTable
+    mission: MissionTable
+    catalogue: CatalogueTable = msgspec.field(default_factory=CatalogueTable)
+    search: SearchSettings = msgspec.field(default_factory=SearchSettings)
+
+
+def builtin_problems() -> dict[str, str]:
+    """Return the names of the built-in problems and their TOML texts."""
+    folder = resources.files("seqsearch") / "problems"
+    return {
+        entry.name.removesuffix(".toml"): entry.read_text(encoding="utf-8")
+        for entry in sorted(folder.iterdir(), key=lambda entry: entry.name)
+        if entry.name.endswith(".toml")
+    }
+
+
+def read_config(problem: str) -> Config:
+    """Read a problem by name or from a TOML file.
+
+    Parameters
+    ----------
+    problem : str
+        Name of a built-in problem (``gtoc7``, ``demo``) or path of a TOML file.
+
+    Raises
+    ------
+    InputError
+        No such problem, unreadable file, TOML that does not parse, an unknown
+        key, or a value of the wrong type; the message names file and key.
+    """
+    builtin = builtin_problems()
+    if problem in builtin:
+        return _decode(builtin[problem], f"built-in problem {problem}")
+    path = Path(problem)
+    if not path.exists():
+        raise InputError(
+            f"{problem}: no such problem or file; built-in problems are {', '.join(builtin)}"
+        )
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: cannot be read as a TOML file ({error})") from None
+    config = _decode(text, str(path))
+    file = config.catalogue.file
+    if file is not None and not Path(file).is_absolute():
+        # A path inside a file is meant relative to that file.
+        catalogue = msgspec.structs.replace(config.catalogue, file=str(path.parent / file))
+        config = msgspec.structs.replace(config, catalogue=catalogue)
+    return config
+
+
+def _decode(text: str, label: str) -> Config:
+    try:
+        return msgspec.toml.decode(text, type=Config, strict=False)
+    except msgspec.ValidationError as error:
+        raise InputError(f"{label}: {_readable(str(error))}") from None
+    except msgspec.DecodeError as error:
+        raise InputError(f"{label}: not valid TOML ({error})") from None
+
+
+def _readable(message: str) -> str:
+    """Rewrite msgspec's ``... - at `$.search` `` in the words of a TOML file."""
+    text, _, where = message.partition(" - at `$")
+    where = where.rstrip("`").lstrip(".")
+    if text.startswith("Object contains unknown field"):
+        key = text.split("`")[1]
+        table: Any = Config
+        if where:
+            table = {field.name: field.type for field in msgspec.structs.fields(Config)}[where]
+        known = ", ".join(field.name for field in msgspec.structs.fields(table))
+        place = f"in [{where}]" if where else "at top level"
+        return f"unknown key {key!r} {place}; known keys are {known}"
+    text = text[0].lower() + text[1:]
+    return f"{text} (at {where})" if where else text
+
+
+def override(config: Config, **changes: Any) -> Config:
+    """Return the configuration with values of its ``[search]`` table replaced.
+
+    Values that are None are left as they are.
+
+    Raises
+    ------
+    InputError
+        A value is out of range.
+    """
+    given = {name: value for name, value in changes.items() if value is not None}
+    return msgspec.structs.replace(config, search=config.search.with_(**given))
+
+
+def with_catalogue(config: Config, file: str) -> Config:
+    """Return the configuration with another catalogue file."""
+    return msgspec.structs.replace(config, catalogue=CatalogueTable(file=file))
+
+
+def build_problem(config: Config) -> Problem:
+    """Load the catalogue and build the validated problem.
+
+    Raises
+    ------
+    InputError
+        The catalogue is missing or malformed, or a value is out of range.
+    """
+    craft = config.spacecraft
+    mission = config.mission
+    earliest, latest = mission.first_departure_mjd
+    return Problem(
+        name=config.problem.name,
+        catalogue=_load_catalogue(config),
+        spacecraft=Spacecraft(craft.dry_mass_kg, craft.thrust_n, craft.isp_s),
+        m0=craft.wet_mass_kg,
+        first_departure_mjd2000=(mjd_to_mjd2000(earliest), mjd_to_mjd2000(latest)),
+        max_duration_days=mission.max_duration_days,
+        min_stay_days=mission.min_stay_days,
+        start_ids=mission.start_ids,
+    )
+
+
+def load_problem(problem: str, catalogue: str | Path | None = None) -> Problem:
+    """Return a problem by name or from a TOML file, with its catalogue.
+
+    Parameters
+    ----------
+    problem : str
+        Name of a built-in problem (``gtoc7``, ``demo``) or path of a TOML file.
+    catalogue : str or Path, optional
+        Asteroid table to use instead of the one that the problem names.
+
+    Raises
+    ------
+    InputError
+        As `read_config` and `build_problem`.
+    """
+    config = read_config(problem)
+    return build_problem(config if catalogue is None else with_catalogue(config, str(catalogue)))
+
+
+def _load_catalogue(config: Config) -> Catalogue:
+    table = config.catalogue
+    if table.file is not None and table.synthetic_bodies is not None:
+        raise InputError(
+            f"problem {config.problem.name}: [catalogue] has both file and synthetic_bodies, "
+            "expected one of them"
+        )
+    if table.file is not None:
+        return read_catalogue(Path(table.file))
+    if table.synthetic_bodies is not None:
+        rng = np.random.default_rng(table.synthetic_seed)
+        return synthetic_main_belt(table.synthetic_bodies, rng)
+    raise InputError(
+        f"problem {config.problem.name}: no asteroid table; give one with --catalogue FILE "
+        "(the README says where the official tables are)"
+    )
+
+
+def to_toml(config: Config) -> str:
+    """Return the resolved configuration as TOML; `read_config` reads it back."""
+    tables = msgspec.to_builtins(config)
+    plain = {
+        name: {key: value for key, value in table.items() if value is not None}
+        for name, table in tables.items()
+    }
+    return tomli_w.dumps(plain)

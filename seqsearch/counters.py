@@ -1,0 +1,48 @@
+"""Counters of the search, one record a rank."""
+
+from dataclasses import dataclass, field
+from typing import final
+
+
+@final
+@dataclass(kw_only=True)
+class RankCounters:
+    """What happened at one rank of one pass.
+
+    Attributes
+    ----------
+    pass_number, rank : int
+        Pass from 1; rank from 1, the number of legs of the nodes produced.
+    nodes : int
+        Nodes that were expanded.
+    proposed : int
+        Candidate legs.
+    pruned : dict of str to int
+        Legs dropped by each pruner, in the order in which they were asked.
+    optimised : int
+        Legs that went to the leg solver.
+    feasible : int
+        Legs it could fly.
+    kept : int
+        Nodes kept for the next rank.
+    seconds_expand, seconds_prune, seconds_optimise, seconds : float
+        Wall-clock time of the steps and of the whole rank.
+    """
+
+    pass_number: int
+    rank: int
+    nodes: int = 0
+    proposed: int = 0
+    pruned: dict[str, int] = field(default_factory=dict)
+    optimised: int = 0
+    feasible: int = 0
+    kept: int = 0
+    seconds_expand: float = 0.0
+    seconds_prune: float = 0.0
+    seconds_optimise: float = 0.0
+    seconds: float = 0.0
+
+    def count_pruned(self, pruned: dict[str, int]) -> None:
+        """Add the counts of one batch."""
+        for name, count in pruned.items():
+            self.pruned[name] = self.pruned.get(name, 0) + count

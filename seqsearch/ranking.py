@@ -1,0 +1,45 @@
+"""Rankings: which nodes of a rank are worth going on with."""
+
+from dataclasses import dataclass
+from typing import Protocol, final, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seqsearch.nodes import Nodes
+from seqsearch.problem import Problem
+
+
+@runtime_checkable
+class Ranking(Protocol):
+    """Scores the nodes of one rank; the smallest scores go on.
+
+    The contract: one finite score a node, row-wise (a node's score depends on
+    that node and the problem alone) and pure.
+    """
+
+    def score(self, nodes: Nodes, problem: Problem, /) -> NDArray[np.float64]:
+        """Return (n,) float64, smaller is better."""
+        ...
+
+
+@final
+@dataclass(frozen=True)
+class TimePropellantRanking:
+    """Weighted sum of the shares of time and propellant that are used up.
+
+    Parameters
+    ----------
+    time_weight, propellant_weight : float
+        Weights of elapsed time over the problem's duration and of used over
+        total propellant.
+    """
+
+    time_weight: float = 1.0
+    propellant_weight: float = 0.6
+
+    def score(self, nodes: Nodes, problem: Problem, /) -> NDArray[np.float64]:
+        """Return (n,) float64, smaller is better."""
+        elapsed = (nodes.t_arr_mjd2000 - nodes.t_first_mjd2000) / problem.max_duration_days
+        used = (problem.m0 - nodes.mass) / (problem.m0 - problem.spacecraft.m_dry)
+        return self.time_weight * elapsed + self.propellant_weight * used

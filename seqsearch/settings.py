@@ -1,0 +1,106 @@
+"""`SearchSettings`: how the search goes about it; the ``[search]`` table of a problem file."""
+
+from typing import Annotated, final
+
+import msgspec
+import numpy as np
+from msgspec import Meta
+from numpy.typing import NDArray
+
+from feasibility import InputError
+
+_Positive = Annotated[float, Meta(gt=0)]
+_Count = Annotated[int, Meta(ge=1)]
+
+
+@final
+class SearchSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Settings of the beam search, all with defaults.
+
+    Parameters
+    ----------
+    beam_width : int
+        Nodes kept at each rank.
+    starts : int
+        Start nodes of a pass: the asteroid-epoch pairs with the densest neighbourhoods.
+    start_epochs : int
+        Departure epochs at which neighbourhoods are looked at, spread over the window.
+    neighbours : int
+        Targets proposed for each node: the nearest in the orbital metric.
+    reference_tof_days : float
+        Transfer time in the orbital metric.
+    tof_days_min, tof_days_max, tof_days_step : float
+        Grid of flight times.
+    departure_delays_days : tuple of float
+        Waits beyond the shortest stay that are tried.
+    pruner : str
+        Pruners with an optional parameter, asked in turn, such as
+        ``"lambert:1.3,mima2:0.97"``; ``"none"`` keeps all.
+    solver : str
+        Leg solver for the full optimisation: ``"fast"`` or ``"reference"``.
+    solves_per_rank : int
+        Most legs that are optimised at one rank, the most promising first.
+    flyable_per_target : int
+        Flight times wanted for each node and target, shortest first.
+    max_per_parent : int
+        Most children of one node that are kept.
+    max_per_cell : int
+        Most nodes kept at one rank at one asteroid within the same `cell_days`.
+    cell_days : float
+        Width of the epoch cells of `max_per_cell`.
+    time_weight, propellant_weight : float
+        Weights of the used shares of time and propellant in the ranking.
+    passes : int
+        Beams run one after another, each with starts of its own.
+    """
+
+    beam_width: _Count = 100
+    starts: _Count = 200
+    start_epochs: _Count = 40
+    neighbours: _Count = 60
+    reference_tof_days: _Positive = 180.0
+    tof_days_min: _Positive = 60.0
+    tof_days_max: _Positive = 300.0
+    tof_days_step: _Positive = 15.0
+    departure_delays_days: tuple[Annotated[float, Meta(ge=0)], ...] = (0.0,)
+    pruner: str = "lambert:1.3,mima2:0.97"
+    solver: str = "fast"
+    solves_per_rank: _Count = 4000
+    flyable_per_target: _Count = 2
+    max_per_parent: _Count = 10
+    max_per_cell: _Count = 3
+    cell_days: _Positive = 20.0
+    time_weight: Annotated[float, Meta(ge=0)] = 1.0
+    propellant_weight: Annotated[float, Meta(ge=0)] = 0.6
+    passes: _Count = 1
+
+    def __post_init__(self) -> None:
+        if self.tof_days_max < self.tof_days_min:
+            raise ValueError(
+                f"tof_days_max = {self.tof_days_max:g} is below "
+                f"tof_days_min = {self.tof_days_min:g}"
+            )
+        if not self.departure_delays_days:
+            raise ValueError("departure_delays_days is empty, expected at least one delay")
+        if self.time_weight + self.propellant_weight <= 0:
+            raise ValueError("time_weight and propellant_weight are both zero")
+
+    def with_(self, **changes: object) -> "SearchSettings":
+        """Return the settings with some values replaced, validated.
+
+        Raises
+        ------
+        InputError
+            An unknown name or a value out of range.
+        """
+        try:
+            return msgspec.convert(msgspec.to_builtins(self) | changes, type=SearchSettings)
+        except msgspec.ValidationError as error:
+            raise InputError(f"search settings: {error}") from None
+
+    def tof_days(self) -> NDArray[np.float64]:
+        """Return the grid of flight times in days, both ends included."""
+        steps = round((self.tof_days_max - self.tof_days_min) / self.tof_days_step)
+        if steps > 10_000:
+            raise InputError(f"search: {steps} flight times per target, expected at most 10000")
+        return self.tof_days_min + self.tof_days_step * np.arange(steps + 1)
