@@ -26,6 +26,7 @@ from feasibility.sims_flanagan.starts import lambert_starts, random_starts, tang
 
 _MASS_ROUNDING = 1e-6
 _LEAST_IMPULSE = 1e-9
+_CONSTRAINT_ROUNDING = 1e-7
 
 
 def reference_max_initial_mass(
@@ -218,7 +219,7 @@ def _evolve(problem: Any, guess: NDArray[np.float64], algorithm: Any) -> NDArray
 
     wrapped = pygmo.problem(problem)
     # pygmo keeps the guess unless the result is better under these tolerances.
-    wrapped.c_tol = [MISMATCH_TOLERANCE] * 7 + [2.0 * THROTTLE_TOLERANCE] * problem.n_segments
+    wrapped.c_tol = [0.5 * MISMATCH_TOLERANCE] * 7 + [_CONSTRAINT_ROUNDING] * problem.n_segments
     lower, upper = wrapped.get_bounds()
     population = pygmo.population(wrapped)
     population.push_back(np.clip(guess, lower, upper))
@@ -243,7 +244,7 @@ def _slsqp() -> Any:
     import pygmo
 
     solver = pygmo.nlopt("slsqp")
-    solver.maxeval = 200
+    solver.maxeval = 1000
     solver.ftol_rel = 1e-6
     solver.xtol_rel = 0.0
     return pygmo.algorithm(solver)
