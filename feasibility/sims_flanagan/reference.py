@@ -6,7 +6,7 @@ Slow, plain and independent of the fast solver, which it checks and backs up.
 import functools
 import time
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,6 @@ from feasibility.sims_flanagan.solutions import (
     MISMATCH_TOLERANCE,
     THROTTLE_TOLERANCE,
     LegSolutions,
-    SolutionRows,
     Status,
 )
 from feasibility.sims_flanagan.starts import lambert_starts, random_starts, tangential_starts
@@ -27,6 +26,15 @@ from feasibility.sims_flanagan.starts import lambert_starts, random_starts, tang
 _MASS_ROUNDING = 1e-6
 _LEAST_IMPULSE = 1e-9
 _CONSTRAINT_ROUNDING = 1e-7
+
+
+class _Closed(NamedTuple):
+    """A closed leg: throttles (s, 3), masses in kg, mismatch."""
+
+    throttles: NDArray[np.float64]
+    m0: float
+    m_final: float
+    mismatch: float
 
 
 def reference_max_initial_mass(
@@ -70,18 +78,16 @@ def reference_max_initial_mass(
     _check_segments(n_segments)
     if n_random and rng is None:
         raise InputError("reference_max_initial_mass: n_random needs rng, a numpy Generator")
-    rows = SolutionRows(len(legs), n_segments)
+    solutions = LegSolutions.unsolved(len(legs), n_segments)
     for row in range(len(legs)):
         began = time.process_time()
         leg = scaled_leg(legs, row, float(legs.m0[row]), n_segments)
-        best_mass = 0.0
         for start, impulses in _starts(leg, n_segments, n_random, rng):
             found = _maximise_mass(legs, row, impulses)
-            if found is not None and found[1] > best_mass:
-                best_mass = found[1]
-                rows.put(row, *found, start)
-        rows.seconds[row] = time.process_time() - began
-    return rows.solutions()
+            if found is not None and found.m0 > solutions.m0[row]:
+                _put(solutions, row, found, start)
+        solutions.seconds[row] = time.process_time() - began
+    return solutions
 
 
 def _starts(
@@ -93,10 +99,8 @@ def _starts(
         yield from random_starts(leg, n_segments, n_random, rng)
 
 
-def _maximise_mass(
-    legs: Legs, row: int, impulses: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], float, float, float] | None:
-    """Return throttles, m0, m_final and mismatch from one start, None if it does not close."""
+def _maximise_mass(legs: Legs, row: int, impulses: NDArray[np.float64]) -> _Closed | None:
+    """Return what IPOPT finds from one start, None if it does not close."""
     n_segments = len(impulses)
     leg = scaled_leg(legs, row, float(legs.m0[row]), n_segments)
     masses, final = _mass_profile(impulses, leg.veff)
@@ -161,24 +165,22 @@ def reference_min_propellant(
         guess = reference_max_initial_mass(legs, n_segments=n_segments)
     if len(guess) != len(legs):
         raise InputError(f"reference_min_propellant: {len(guess)} guesses for {len(legs)} legs")
-    rows = SolutionRows(len(legs), guess.n_segments)
+    solutions = LegSolutions.unsolved(len(legs), guess.n_segments)
     for row in np.flatnonzero(guess.converged):
         began = time.process_time()
         if legs.m0[row] > guess.m0[row] * (1.0 + _MASS_ROUNDING):
-            rows.status[row] = Status.TOO_HEAVY
+            solutions.status[row] = Status.TOO_HEAVY
         else:
             found = _minimise_propellant(legs, int(row), guess)
-            if found is not None and found[2] < legs.m_dry[row]:
-                rows.status[row] = Status.BELOW_DRY_MASS
+            if found is not None and found.m_final < legs.m_dry[row]:
+                solutions.status[row] = Status.BELOW_DRY_MASS
             elif found is not None:
-                rows.put(int(row), *found, int(guess.start[row]))
-        rows.seconds[row] = time.process_time() - began
-    return rows.solutions()
+                _put(solutions, int(row), found, int(guess.start[row]))
+        solutions.seconds[row] = time.process_time() - began
+    return solutions
 
 
-def _minimise_propellant(
-    legs: Legs, row: int, guess: LegSolutions
-) -> tuple[NDArray[np.float64], float, float, float] | None:
+def _minimise_propellant(legs: Legs, row: int, guess: LegSolutions) -> _Closed | None:
     m0 = float(legs.m0[row])
     lighter = m0 / float(guess.m0[row])
     throttles = guess.throttles[row].ravel() * lighter
@@ -191,9 +193,19 @@ def _minimise_propellant(
         leg = scaled_leg(legs, row, m0, guess.n_segments)
         x = _evolve(MinimumPropellantProblem(leg), x0, algorithm)
         found = _confirmed(legs, row, x[:-1], m0, float(x[-1]) * m0)
-        if found is not None and (best is None or found[2] > best[2]):
+        if found is not None and (best is None or found.m_final > best.m_final):
             return found
     return best
+
+
+def _put(solutions: LegSolutions, row: int, found: _Closed, start: int) -> None:
+    solutions.throttles[row] = found.throttles
+    solutions.m0[row] = found.m0
+    solutions.m_final[row] = found.m_final
+    solutions.mismatch[row] = found.mismatch
+    solutions.converged[row] = True
+    solutions.status[row] = Status.CONVERGED
+    solutions.start[row] = start
 
 
 def _check_segments(n_segments: int) -> None:
@@ -203,7 +215,7 @@ def _check_segments(n_segments: int) -> None:
 
 def _confirmed(
     legs: Legs, row: int, throttles: NDArray[np.float64], m0: float, m_final: float
-) -> tuple[NDArray[np.float64], float, float, float] | None:
+) -> _Closed | None:
     """Return the solution with throttles cut to 1, if pykep's leg confirms it."""
     vectors = throttles.reshape(-1, 3)
     norms = np.linalg.norm(vectors, axis=1, keepdims=True)
@@ -211,7 +223,7 @@ def _confirmed(
         return None
     vectors = vectors / np.maximum(norms, 1.0)
     mismatch = confirm(legs.take([row]), vectors[None], np.array([m0]), np.array([m_final])).item()
-    return (vectors, m0, m_final, mismatch) if mismatch < MISMATCH_TOLERANCE else None
+    return _Closed(vectors, m0, m_final, mismatch) if mismatch < MISMATCH_TOLERANCE else None
 
 
 def _evolve(problem: Any, guess: NDArray[np.float64], algorithm: Any) -> NDArray[np.float64]:
