@@ -1,0 +1,8 @@
+"""``python -m seqsearch``: the same as the command ``seqsearch``."""
+
+import sys
+
+from seqsearch.cli import main
+
+if __name__ == "__main__":
+    sys.exit(main())

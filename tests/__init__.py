@@ -1,0 +1,1 @@
+"""Tests of feasibility and seqsearch."""

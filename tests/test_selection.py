@@ -1,0 +1,72 @@
+"""Beam selection: the caps hold, and nothing better was left out."""
+
+from collections import Counter
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from seqsearch.nodes import Nodes
+from seqsearch.selection import select
+from seqsearch.settings import SearchSettings
+
+
+def _nodes(rows: list[int], epochs: list[float], middles: list[int]) -> Nodes:
+    n = len(rows)
+    row = np.asarray(rows, dtype=np.intp)
+    epoch = np.asarray(epochs)
+    visited = np.column_stack([np.full(n, 1000), np.asarray(middles, dtype=np.intp), row])
+    return Nodes(
+        row=row,
+        t_ready_mjd2000=epoch,
+        t_arr_mjd2000=epoch,
+        t_first_mjd2000=np.zeros(n),
+        mass=np.ones(n),
+        visited=visited.astype(np.intp),
+        tree_id=np.arange(n),
+    )
+
+
+_rank = st.integers(1, 60).flatmap(
+    lambda n: st.tuples(
+        st.lists(st.integers(0, 4), min_size=n, max_size=n),
+        st.lists(st.floats(0, 100), min_size=n, max_size=n),
+        st.lists(st.integers(10, 14), min_size=n, max_size=n),
+        st.lists(st.integers(0, 3), min_size=n, max_size=n),
+        st.lists(st.floats(0, 1), min_size=n, max_size=n),
+    )
+)
+
+
+@given(_rank, st.integers(1, 10), st.integers(1, 4), st.integers(1, 4))
+def test_selection_keeps_every_cap_and_leaves_out_nothing_better(
+    rank, beam_width, per_parent, per_cell
+):
+    rows, epochs, middles, parents, scores = rank
+    nodes = _nodes(rows, epochs, middles)
+    parent = np.asarray(parents, dtype=np.intp)
+    score = np.asarray(scores)
+    settings = SearchSettings(
+        beam_width=beam_width, max_per_parent=per_parent, max_per_cell=per_cell, cell_days=20.0
+    )
+    chosen = select(score, nodes, parent, settings)
+
+    def keys(i):
+        cell = (rows[i], int(epochs[i] // 20.0))
+        return ("p", parents[i]), ("c", *cell), ("s", *cell, frozenset((rows[i], middles[i])))
+
+    limits = {"p": per_parent, "c": per_cell, "s": 1}
+    counts = Counter(key for i in chosen for key in keys(i))
+    assert len(set(chosen)) == len(chosen) <= beam_width
+    assert all(count <= limits[key[0]] for key, count in counts.items())
+    assert np.all(np.diff(score[chosen]) >= 0)
+    for i in set(range(len(rows))) - set(chosen.tolist()):
+        better = [j for j in chosen if (score[j], j) < (score[i], i)]
+        before = Counter(key for j in better for key in keys(j))
+        full = len(better) == beam_width
+        assert full or any(before[key] >= limits[key[0]] for key in keys(i))
+
+
+def test_an_empty_rank_gives_an_empty_beam():
+    nodes = _nodes([], [], [])
+    assert len(select(np.zeros(0), nodes, np.zeros(0, dtype=np.intp), SearchSettings())) == 0
