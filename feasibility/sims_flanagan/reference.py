@@ -5,7 +5,6 @@ Slow, plain and independent of the fast solver, which it checks and backs up.
 
 import functools
 import time
-from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,9 +20,10 @@ from feasibility.sims_flanagan.solutions import (
     LegSolutions,
     Status,
 )
-from feasibility.sims_flanagan.starts import lambert_starts, random_starts, tangential_starts
+from feasibility.sims_flanagan.starts import FIRST_RANDOM, reference_starts
 
 _MASS_ROUNDING = 1e-6
+_SAME_MASS = 1e-3
 _LEAST_IMPULSE = 1e-9
 _CONSTRAINT_ROUNDING = 1e-7
 
@@ -43,12 +43,15 @@ def reference_max_initial_mass(
     n_segments: int = N_SEGMENTS,
     rng: np.random.Generator | None = None,
     n_random: int = 0,
+    agreement: int = 5,
 ) -> LegSolutions:
     """Find the maximum initial mass m* of each leg: the best of several starts of IPOPT.
 
     The starts are every Lambert branch up to 2 revolutions, thrust along and
-    against the velocity, and `n_random` smooth random ones. Neither the legs'
-    `m0` nor `m_dry` plays a part.
+    against the velocity in several sizes, and smoothly wandering thrust
+    (`starts.reference_starts`); they stop when `agreement` of them have led to
+    the best mass, so that a leg with one optimum costs little and a leg with
+    many gets all. Neither the legs' `m0` nor `m_dry` plays a part.
 
     Parameters
     ----------
@@ -59,44 +62,47 @@ def reference_max_initial_mass(
     rng : numpy.random.Generator, optional
         Source of the random starts.
     n_random : int
-        Random starts of each leg; needs `rng`.
+        Random starts of each leg after the others, in any case; needs `rng`.
+    agreement : int
+        How many starts have to agree on the best mass, to 0.1 %, before the
+        remaining fixed ones are left out; at least 1.
 
     Returns
     -------
     LegSolutions
-        n rows; `start` is 0 to 4 for the Lambert branches (0 revolutions, then
-        low and high path of 1 and 2), 5 along and 6 against the velocity, from
-        7 the random ones.
+        n rows; `start` is an index of `starts`: 0 to 4 are Lambert branches (0
+        revolutions, then low and high path of 1 and 2), then the tangential, the
+        wandering and the random starts.
 
     Raises
     ------
     InputError
-        `n_segments` is below 2, or random starts are asked for without `rng`.
+        `n_segments` is below 2, `agreement` below 1, or random starts are asked
+        for without `rng`.
     MissingDependencyError
         pykep or pygmo is not installed.
     """
     _check_segments(n_segments)
+    if agreement < 1:
+        raise InputError(f"reference_max_initial_mass: agreement {agreement}, expected at least 1")
     if n_random and rng is None:
         raise InputError("reference_max_initial_mass: n_random needs rng, a numpy Generator")
     solutions = LegSolutions.unsolved(len(legs), n_segments)
     for row in range(len(legs)):
         began = time.process_time()
         leg = scaled_leg(legs, row, float(legs.m0[row]), n_segments)
-        for start, impulses in _starts(leg, n_segments, n_random, rng):
+        masses: list[float] = []
+        for start, impulses in reference_starts(leg, n_random, rng):
+            if start < FIRST_RANDOM and _agreed(masses, agreement):
+                continue
             found = _maximise_mass(legs, row, impulses)
-            if found is not None and found.m0 > solutions.m0[row]:
+            if found is None:
+                continue
+            masses.append(found.m0)
+            if found.m0 > solutions.m0[row]:
                 _put(solutions, row, found, start)
         solutions.seconds[row] = time.process_time() - began
     return solutions
-
-
-def _starts(
-    leg: Any, n_segments: int, n_random: int, rng: np.random.Generator | None
-) -> Iterator[tuple[int, NDArray[np.float64]]]:
-    yield from lambert_starts(leg, n_segments)
-    yield from tangential_starts(leg, n_segments)
-    if rng is not None:
-        yield from random_starts(leg, n_segments, n_random, rng)
 
 
 def _maximise_mass(legs: Legs, row: int, impulses: NDArray[np.float64]) -> _Closed | None:
@@ -196,6 +202,13 @@ def _minimise_propellant(legs: Legs, row: int, guess: LegSolutions) -> _Closed |
         if found is not None and (best is None or found.m_final > best.m_final):
             return found
     return best
+
+
+def _agreed(masses: list[float], agreement: int) -> bool:
+    if len(masses) < agreement:
+        return False
+    best = max(masses)
+    return sum(mass > (1.0 - _SAME_MASS) * best for mass in masses) >= agreement
 
 
 def _put(solutions: LegSolutions, row: int, found: _Closed, start: int) -> None:
