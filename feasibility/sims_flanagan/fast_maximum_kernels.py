@@ -43,6 +43,13 @@ class Workspace(NamedTuple):
     linear: NDArray[np.float64]
     starts: NDArray[np.float64]
     start_z: NDArray[np.float64]
+    start_longitude: NDArray[np.float64]
+    start_lam: NDArray[np.float64]
+    start_nodes: NDArray[np.float64]
+    jumps: NDArray[np.float64]
+    moved: NDArray[np.float64]
+    response: NDArray[np.float64]
+    pinned: NDArray[np.bool_]
     dual: tuple[NDArray[np.float64], ...]
 
 
@@ -57,9 +64,8 @@ def make_workspace(n):
         np.empty(n),
         np.empty((6, 6)),
         np.empty((6, 6)),
-        np.empty(6),
-        np.empty(6),
-        np.empty(6),
+        np.empty((n, 3)),
+        np.empty((6, 6)),
     )
     return Workspace(
         np.empty((n, 6, 3)),
@@ -76,6 +82,13 @@ def make_workspace(n):
         np.empty((n, 3)),
         np.empty((N_STARTS, n, 3)),
         np.empty(N_STARTS),
+        np.empty(N_STARTS),
+        np.empty((N_STARTS, 6)),
+        np.empty((N_STARTS, n, 6)),
+        np.empty((n, 6)),
+        np.empty((n, 6)),
+        np.empty((n, 6, 3)),
+        np.empty(n, dtype=np.bool_),
         dual,
     )
 
@@ -194,7 +207,9 @@ def improve(x0, dv, n, n_forward, dt, c, target, iterations, gain_tolerance, z_s
             work[i] = total
         # lam lives in element coordinates between linearisations.
         whiten_costate(w.lower, lam)
-        z_linear = least_thrust(w.b, work, n, n_forward, c, lam, z, w.linear, w.dual)
+        z_linear = least_thrust(
+            w.b, work, n, n_forward, c, lam, z, dv, w.linear, w.pinned, w.dual, info
+        )
         solve_lower_transposed(w.lower, lam)
         if not z_linear > 0.0:
             break
@@ -235,80 +250,198 @@ def whiten_costate(lower, lam):
 
 
 @kernel
-def element_start(e0, e1, tof, turns, n, n_forward, c, passes, dv, w):
-    """Write the impulses of a start for a number of turns; return their z, inf where none.
+def drift(e, dt):
+    """Move elements along their Kepler orbit."""
+    e[5] += e[0] * dt
 
-    The elements are drawn along a path: linear in time, the mean motion with a
-    parabola on top that makes the mean longitude arrive after the wanted number of
-    turns. Along such a path the elements respond linearly to impulses, so one
-    convex problem gives the start; its own path then replaces the drawn one.
+
+@kernel
+def draw_path(e0, e1, tof, turns, n, nodes):
+    """Draw the elements before each impulse along a path with a number of turns.
+
+    Linear in time, the mean motion with a parabola on top that makes the mean
+    longitude arrive after the wanted number of turns. Returns the mean longitude
+    at arrival, NaN where the path would need an absurd mean motion.
     """
-    dt = tof / n
     mean_motion = 0.5 * (e0[0] + e1[0])
     travel = mean_motion * tof + wrap(e1[5] - e0[5] - mean_motion * tof) + _TWO_PI * turns
     bump = travel / tof - mean_motion
     low = min(e0[0], e1[0])
-    if not mean_motion + 1.5 * bump > 0.2 * low:
-        return np.inf
-    e = w.e[3]
+    high = max(e0[0], e1[0])
+    if turns != 0 and not mean_motion + 1.5 * bump > 0.2 * low:
+        return np.nan
+    for i in range(n):
+        t = (i + 0.5) / n
+        for j in range(1, 5):
+            nodes[i, j] = e0[j] + t * (e1[j] - e0[j])
+        motion = e0[0] + t * (e1[0] - e0[0]) + 6.0 * bump * t * (1.0 - t)
+        nodes[i, 0] = min(max(motion, 0.5 * low), 2.0 * high)
+        nodes[i, 5] = e0[5] + tof * (
+            e0[0] * t + 0.5 * (e1[0] - e0[0]) * t * t + bump * t * t * (3.0 - 2.0 * t)
+        )
+    return e0[5] + travel
+
+
+@kernel
+def lifted_sweep(e0, e1, longitude, dt, n, n_forward, c, first, nodes, dv, z, lam, w, info):
+    """Bend a path of nodes and its impulses towards a true arc of least thrust.
+
+    One lifted Newton step: every node is an unknown of its own, condensed to the
+    impulses; in elements the coasts between nodes are exactly linear. Returns the
+    new z, -1 where the step fails, and the largest move of a node, inf where the step
+    had to be shortened.
+    """
+    jumps, response, moved = w.jumps, w.response, w.moved
     gap = w.v6[0]
-    lam = w.v6[2]
-    path = w.trial
-    # Gap of the coasted departure orbit.
-    for i in range(5):
-        gap[i] = e1[i] - e0[i]
-    gap[5] = travel - e0[0] * tof
-    z = -1.0
-    for i in range(6):
-        lam[i] = 0.0
-    now = w.v6[3]
-    for sweep in range(passes):
-        for i in range(6):
-            now[i] = e0[i]
-        for i in range(n):
-            t = (i + 0.5) / n
-            if sweep == 0:
-                for j in range(1, 5):
-                    e[j] = e0[j] + t * (e1[j] - e0[j])
-                e[0] = e0[0] + t * (e1[0] - e0[0]) + 6.0 * bump * t * (1.0 - t)
-                e[5] = e0[5] + tof * (
-                    e0[0] * t + 0.5 * (e1[0] - e0[0]) * t * t + bump * t * t * (3.0 - 2.0 * t)
-                )
-            else:
-                now[5] += now[0] * (0.5 * dt if i == 0 else dt)
-                half = path[i]
-                for j in range(6):
-                    jump = 0.0
-                    for k in range(3):
-                        jump += w.stm[i, j, k] * half[k]
-                    e[j] = now[j] + 0.5 * jump
-                    now[j] += jump
-            if not e[0] > 0.1 * low or not e[1] ** 2 + e[2] ** 2 < 0.9:
-                return z if z > 0.0 else np.inf
-            from_elements(e, w.x)
-            if not element_derivatives(w.x, 3, w.m, w.e[0], w.e[1], w.e[2]):
-                return np.inf
+    total = w.v6[2]
+    work = w.v6[3]
+    # Jump of each node, its derivatives by the impulse and by the node.
+    for i in range(n):
+        from_elements(nodes[i], w.x)
+        if not first:
+            if not element_derivatives(w.x, 0, w.m, w.e[0], w.e[1], w.e[2]):
+                return -1.0, np.inf
+            for j in range(3):
+                w.x[3 + j] += dv[i, j]
+        if not to_elements(w.x, jumps[i]):
+            return -1.0, np.inf
+        for j in range(6):
+            jumps[i, j] -= nodes[i, j]
+        jumps[i, 5] = wrap(jumps[i, 5])
+        if first:
+            if not element_derivatives(w.x, 3, w.m_next, w.e[0], w.e[1], w.e[2]):
+                return -1.0, np.inf
             for j in range(6):
                 for k in range(3):
-                    w.stm[i, j, k] = w.m[j, k]
-                    w.b[i, j, k] = w.m[j, k]
+                    response[i, j, k] = w.m_next[j, k]
+                for k in range(6):
+                    w.stm[i, j, k] = 1.0 if j == k else 0.0
+        else:
+            if not element_derivatives(w.x, 0, w.m_next, w.e[0], w.e[1], w.e[2]):
+                return -1.0, np.inf
+            for j in range(6):
+                for k in range(3):
+                    response[i, j, k] = w.m_next[j, 3 + k]
+            if not divide(w.m_next, w.m, w.stm[i]):
+                return -1.0, np.inf
+    # Condense, last node first: m = d(end)/d(elements after impulse i).
+    for j in range(6):
+        gap[j] = e1[j] - nodes[n - 1, j] - jumps[n - 1, j]
+        for k in range(6):
+            w.m[j, k] = 1.0 if j == k else 0.0
+    gap[5] = longitude - nodes[n - 1, 5] - jumps[n - 1, 5]
+    w.m[5, 0] = 0.5 * dt
+    gap[5] -= 0.5 * dt * (nodes[n - 1, 0] + jumps[n - 1, 0])
+    for i in range(n - 1, -1, -1):
+        for j in range(6):
             for k in range(3):
-                w.b[i, 5, k] += (tof - t * tof) * w.m[0, k]
-        if not whiten(w.b, n, w.m, w.lower):
-            return np.inf
-        for i in range(6):
-            w.v6[4, i] = gap[i]
-        solve_lower(w.lower, w.v6[4])
-        whiten_costate(w.lower, lam)
-        new_z = least_thrust(w.b, w.v6[4], n, n_forward, c, lam, z, path, w.dual)
-        solve_lower_transposed(w.lower, lam)
-        if not new_z > 0.0:
-            return z if z > 0.0 else np.inf
-        z = new_z
+                value = 0.0
+                for q in range(6):
+                    value += w.m[j, q] * response[i, q, k]
+                w.b[i, j, k] = value
+        for j in range(6):
+            for k in range(6):
+                value = 0.0
+                for q in range(6):
+                    value += w.m[j, q] * w.stm[i, q, k]
+                w.m_next[j, k] = value
+        # moved[i]: by how much the flow from the node before misses node i.
+        span = dt if i > 0 else 0.5 * dt
+        for j in range(6):
+            before = nodes[i - 1, j] + jumps[i - 1, j] if i > 0 else e0[j]
+            moved[i, j] = before - nodes[i, j]
+        motion = nodes[i - 1, 0] + jumps[i - 1, 0] if i > 0 else e0[0]
+        moved[i, 5] += motion * span
+        for j in range(6):
+            for k in range(6):
+                w.m[j, k] = w.m_next[j, k]
+                gap[j] -= w.m[j, k] * moved[i, k]
+            w.m[j, 0] += w.m[j, 5] * span
+    for j in range(6):
+        total[j] = gap[j]
         for i in range(n):
-            for j in range(3):
-                dv[i, j] = path[i, j]
-    return z
+            for k in range(3):
+                total[j] += w.b[i, j, k] * dv[i, k]
+    if not whiten(w.b, n, w.m, w.lower):
+        return -1.0, np.inf
+    solve_lower(w.lower, total)
+    whiten_costate(w.lower, lam)
+    z = least_thrust(w.b, total, n, n_forward, c, lam, z, dv, w.linear, w.pinned, w.dual, info)
+    solve_lower_transposed(w.lower, lam)
+    if not z > 0.0:
+        return -1.0, np.inf
+    # How the nodes move; half steps where an orbit would open.
+    for j in range(6):
+        work[j] = moved[0, j]
+    change = 0.0
+    for i in range(n):
+        for j in range(6):
+            moved_next = moved[i, j] if i == 0 else work[j] + moved[i, j]
+            moved[i, j] = moved_next
+        for j in range(6):
+            value = 0.0
+            for k in range(6):
+                value += w.stm[i, j, k] * moved[i, k]
+            for k in range(3):
+                value += response[i, j, k] * (w.linear[i, k] - dv[i, k])
+            work[j] = value
+        work[5] += work[0] * dt
+        for k in range(3):
+            change += abs(w.linear[i, k] - dv[i, k])
+    fraction = 1.0
+    for _ in range(6):
+        inside = True
+        for i in range(n):
+            ex = nodes[i, 1] + fraction * moved[i, 1]
+            ey = nodes[i, 2] + fraction * moved[i, 2]
+            motion = nodes[i, 0] + fraction * moved[i, 0]
+            if not (ex * ex + ey * ey < 0.9 and 0.1 * e0[0] < motion < 10.0 * e0[0]):
+                inside = False
+        if inside:
+            break
+        fraction *= 0.5
+    if not inside:
+        return -1.0, np.inf
+    largest = 0.0
+    for i in range(n):
+        for j in range(6):
+            nodes[i, j] += fraction * moved[i, j]
+            largest = max(largest, abs(fraction * moved[i, j]))
+        for j in range(3):
+            dv[i, j] += fraction * (w.linear[i, j] - dv[i, j])
+    info[6] += 1
+    return z, largest if fraction == 1.0 else np.inf
+
+
+@kernel
+def divide(a, b, quotient):
+    """Write a b^-1 of (6, 6) matrices by Gauss elimination on rows of b^T; destroys both."""
+    # Solve q b = a, column by column of b: column operations on the stacked [b; a].
+    for i in range(6):
+        pivot = i
+        for j in range(i + 1, 6):
+            if abs(b[i, j]) > abs(b[i, pivot]):
+                pivot = j
+        if b[i, pivot] == 0.0:
+            return False
+        if pivot != i:
+            for r in range(6):
+                b[r, i], b[r, pivot] = b[r, pivot], b[r, i]
+                a[r, i], a[r, pivot] = a[r, pivot], a[r, i]
+        inverse = 1.0 / b[i, i]
+        for r in range(6):
+            b[r, i] *= inverse
+            a[r, i] *= inverse
+        for j in range(6):
+            if j != i:
+                factor = b[i, j]
+                for r in range(6):
+                    b[r, j] -= factor * b[r, i]
+                    a[r, j] -= factor * a[r, i]
+    for i in range(6):
+        for j in range(6):
+            quotient[i, j] = a[i, j]
+    return True
 
 
 @kernel
@@ -340,16 +473,70 @@ def maximum_one(x0, x1, tof, c, n, screen, w, best_dv, info):
     winner = -1
     if not to_elements(x0, e0) or not to_elements(x1, e1):
         return best, winner
+    lam_of = w.start_lam
     for s in range(N_STARTS):
         turns = (s + 1) // 2 * (1 if s % 2 else -1)
-        w.start_z[s] = element_start(e0, e1, tof, turns, n, n_forward, c, 3, w.starts[s], w)
+        longitude = draw_path(e0, e1, tof, turns, n, w.start_nodes[s])
+        w.start_z[s] = np.inf
+        w.start_longitude[s] = longitude
+        if math.isnan(longitude):
+            continue
+        z = -1.0
+        for i in range(6):
+            lam_of[s, i] = 0.0
+        for i in range(n):
+            for j in range(3):
+                w.starts[s, i, j] = 0.0
+        for sweep in range(2):
+            new_z, move = lifted_sweep(
+                e0,
+                e1,
+                longitude,
+                dt,
+                n,
+                n_forward,
+                c,
+                sweep == 0,
+                w.start_nodes[s],
+                w.starts[s],
+                z,
+                lam_of[s],
+                w,
+                info,
+            )
+            if not new_z > 0.0:
+                break
+            z = new_z
+        if z > 0.0:
+            w.start_z[s] = z
         info[10 + s] = w.start_z[s]
     for _ in range(N_STARTS):
         s = np.argmin(w.start_z)
-        z_start = w.start_z[s]
-        if not z_start < np.inf or not z_start < screen * best:
+        z = w.start_z[s]
+        if not z < np.inf or not z < screen * best:
             break
         w.start_z[s] = np.inf
+        for _ in range(10):
+            z, move = lifted_sweep(
+                e0,
+                e1,
+                w.start_longitude[s],
+                dt,
+                n,
+                n_forward,
+                c,
+                False,
+                w.start_nodes[s],
+                w.starts[s],
+                z,
+                lam_of[s],
+                w,
+                info,
+            )
+            if not z > 0.0 or move < 1e-3:
+                break
+        for i in range(6):
+            lam[i] = lam_of[s, i]
         for i in range(n):
             for j in range(3):
                 w.dv[i, j] = w.starts[s, i, j]
@@ -357,8 +544,6 @@ def maximum_one(x0, x1, tof, c, n, screen, w, best_dv, info):
         if not close(x0, w.dv, n, dt, e1, 1e-9, 12, w):
             info[4] += 1
             continue
-        for i in range(6):
-            lam[i] = 0.0
         z = improve(x0, w.dv, n, n_forward, dt, c, e1, 30, 1e-4, 0.0, lam, w, info)
         info[20 + s] = z
         if z < best and close(x0, w.dv, n, dt, e1, 1e-12, 4, w):
