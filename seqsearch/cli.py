@@ -27,13 +27,14 @@ Search for the tour with the most visits and write it to a run folder.
 The folder gets config.toml (everything that was set), provenance.json (seed,
 versions), counters.csv (what was proposed, pruned, optimised and feasible at
 each rank), sequence.json (the tour with every impulse) and sequence.csv (its
-legs). It is rewritten after each rank: interrupt the run, or give a time
+legs); tour.png shows it. It is rewritten after each rank: interrupt the run, or give a time
 limit, and the best tour so far is there.
 
 The same seed gives the same tour with any number of workers, unless a time
 limit cuts the search short.
 """
 
+_FIGURES: Final = (".png", ".svg", ".pdf")
 _UNITS_S: Final = {"": 1.0, "s": 1.0, "sec": 1.0, "min": 60.0, "m": 60.0, "h": 3600.0}
 
 
@@ -92,6 +93,15 @@ def _parser() -> argparse.ArgumentParser:
     )
     verify.set_defaults(run=_verify)
 
+    plot = commands.add_parser(
+        "plot",
+        help="draw a tour",
+        description="Draw a tour: its path in the ecliptic, mass and throttle over time.",
+    )
+    plot.add_argument("path", metavar="RUN", help="run folder, or a sequence.json")
+    plot.add_argument("--out", metavar="FILE", required=True, help="a .png, .svg or .pdf file")
+    plot.set_defaults(run=_plot)
+
     problems = commands.add_parser(
         "problems",
         help="show the built-in problems",
@@ -126,12 +136,10 @@ def _run(options: argparse.Namespace) -> int:
 
 def _verify(options: argparse.Namespace) -> int:
     from feasibility.orbits import read_catalogue
-    from seqsearch.run_folder import SEQUENCE
     from seqsearch.tour import read_tour
     from seqsearch.verify import verify_tour
 
-    path = Path(options.path)
-    tour = read_tour(path / SEQUENCE if path.is_dir() else path)
+    tour = read_tour(_sequence_path(options.path))
     catalogue = None if options.catalogue is None else read_catalogue(Path(options.catalogue))
     verification = verify_tour(tour, catalogue)
     print(tour.one_line())
@@ -139,6 +147,24 @@ def _verify(options: argparse.Namespace) -> int:
     print(verification.table())
     print("verified" if verification.passed else "NOT verified")
     return 0 if verification.passed else 1
+
+
+def _plot(options: argparse.Namespace) -> int:
+    from seqsearch.plots import plot_tour
+    from seqsearch.tour import read_tour
+
+    out = Path(options.out)
+    if out.suffix not in _FIGURES:
+        raise InputError(f"--out {out}: expected a name that ends in {', '.join(_FIGURES)}")
+    plot_tour(read_tour(_sequence_path(options.path)), out)
+    return 0
+
+
+def _sequence_path(run: str) -> Path:
+    from seqsearch.run_folder import SEQUENCE
+
+    path = Path(run)
+    return path / SEQUENCE if path.is_dir() else path
 
 
 def _problems(options: argparse.Namespace) -> int:

@@ -16,6 +16,7 @@ from feasibility import InputError
 from seqsearch.beam import search
 from seqsearch.config import build_problem, override, read_config, with_catalogue
 from seqsearch.counters import RankCounters
+from seqsearch.plots import plot_tour
 from seqsearch.pruner_spec import parse_pruner
 from seqsearch.run_folder import RunFolder
 from seqsearch.tour import Tour
@@ -72,6 +73,7 @@ def run_search(
             on_rank=on_rank,
         )
     folder.write(result.tour, result.counters)
+    plot_tour(result.tour, folder.path / "tour.png")
     print()
     print(result.tour.table())
     print()

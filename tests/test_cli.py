@@ -49,6 +49,7 @@ def test_a_run_writes_its_folder_and_verifies(run_folder, capsys):
     names = {path.name for path in run_folder.iterdir()}
     assert names == {
         "config.toml", "provenance.json", "counters.csv", "sequence.json", "sequence.csv",
+        "tour.png",
     }  # fmt: skip
     assert tomllib.loads((run_folder / "config.toml").read_text())["search"]["beam_width"] == 3
     provenance = json.loads((run_folder / "provenance.json").read_text())
@@ -58,6 +59,13 @@ def test_a_run_writes_its_folder_and_verifies(run_folder, capsys):
     assert int(counters[0]["proposed"]) > int(counters[0]["optimised"]) > 0
     assert main(["verify", str(run_folder)]) == 0
     assert "verified" in capsys.readouterr().out
+
+
+def test_plot_draws_the_tour(run_folder, tmp_path, capsys):
+    picture = tmp_path / "tour.svg"
+    assert main(["plot", str(run_folder), "--out", str(picture)]) == 0
+    assert "<svg" in picture.read_text()
+    _fails(["plot", run_folder, "--out", tmp_path / "tour.xyz"], capsys, ".svg")
 
 
 def test_a_tampered_sequence_fails_with_exit_code_1(run_folder, capsys):
