@@ -21,8 +21,11 @@ allocated except by the `_batch` functions.
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from feasibility.jit import kernel
+
+_Array = NDArray[np.float64]
 
 _TWO_PI = 2.0 * math.pi
 _MAX_ITERATIONS = 100
@@ -32,7 +35,7 @@ _SERIES_LIMIT = 1.0
 
 
 @kernel
-def g_functions(s, beta):
+def g_functions(s: float, beta: float) -> tuple[float, float, float]:
     """Return G1, G2, G3 at the universal anomaly `s`.
 
     G1 = s c1, G2 = s^2 c2, G3 = s^3 c3 with Stumpff's c_k(beta s^2): by their
@@ -72,7 +75,7 @@ def g_functions(s, beta):
 
 
 @kernel
-def _first_guess(dt, r0, eta0, beta, mu):
+def _first_guess(dt: float, r0: float, eta0: float, beta: float, mu: float) -> float:
     """Return a first universal anomaly for 0 <= dt, at most half a period."""
     tau = dt / r0
     a = 0.5 * eta0 / r0
@@ -89,7 +92,7 @@ def _first_guess(dt, r0, eta0, beta, mu):
         sigma = e_cos * math.sin(y) + e_sin * math.cos(y)
         e = math.sqrt(e_cos * e_cos + e_sin * e_sin)
         return (y + math.copysign(0.85 * e, sigma)) / k
-    guess = min(tau, np.cbrt(6.0 * dt / mu))
+    guess = min(tau, float(np.cbrt(6.0 * dt / mu)))
     if beta < 0.0:
         # Hyperbolic anomalies at both ends, the final one by the logarithm that bounds it;
         # without it an inbound hyperbola starts far beyond the solution and overflows.
@@ -107,7 +110,9 @@ def _first_guess(dt, r0, eta0, beta, mu):
 
 
 @kernel
-def solve_kepler(dt, r0, eta0, beta, mu):
+def solve_kepler(
+    dt: float, r0: float, eta0: float, beta: float, mu: float
+) -> tuple[float, float, float, float, float]:
     """Return s, G1, G2, G3, turns with dt = r0 G1 + eta0 G2 + mu G3 for any conic and any dt.
 
     The right-hand side increases with s, so Laguerre's iteration (Conway 1986,
@@ -170,7 +175,7 @@ def solve_kepler(dt, r0, eta0, beta, mu):
 
 
 @kernel
-def propagate(rv, dt, mu, out):
+def propagate(rv: _Array, dt: float, mu: float, out: _Array) -> None:
     """Write the state after `dt` of Keplerian motion.
 
     Parameters
@@ -203,7 +208,7 @@ def propagate(rv, dt, mu, out):
 
 
 @kernel
-def propagate_stm(rv, dt, mu, out, stm):
+def propagate_stm(rv: _Array, dt: float, mu: float, out: _Array, stm: _Array) -> None:
     """Write the state after `dt` of Keplerian motion and its derivative.
 
     Parameters
@@ -280,7 +285,7 @@ def propagate_stm(rv, dt, mu, out, stm):
 
 
 @kernel
-def propagate_batch(rv, dt, mu):
+def propagate_batch(rv: _Array, dt: _Array, mu: float) -> _Array:
     """Return (n, 6) states after `dt` (n,) s of Keplerian motion from `rv` (n, 6)."""
     n = rv.shape[0]
     out = np.empty((n, 6))
@@ -290,7 +295,7 @@ def propagate_batch(rv, dt, mu):
 
 
 @kernel
-def propagate_stm_batch(rv, dt, mu):
+def propagate_stm_batch(rv: _Array, dt: _Array, mu: float) -> tuple[_Array, _Array]:
     """Return (n, 6) states and (n, 6, 6) state-transition matrices; see `propagate_stm`."""
     n = rv.shape[0]
     out = np.empty((n, 6))

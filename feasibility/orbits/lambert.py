@@ -66,8 +66,7 @@ def lambert(
         )
     if max_revs < 0:
         raise InputError(f"lambert: max_revs is {max_revs}, expected zero or more")
-    v1, v2 = lambert_batch(start, end, times, int(max_revs), float(mu))
-    return v1, v2
+    return lambert_batch(start, end, times, int(max_revs), float(mu))
 
 
 def _positions(name: str, value: ArrayLike) -> NDArray[np.float64]:

@@ -18,8 +18,11 @@ allocated except by `lambert_batch`.
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from feasibility.jit import kernel
+
+_Array = NDArray[np.float64]
 
 _MAX_ITERATIONS = 60
 # Householder's iteration is of fourth order: after a step this small, relative to the distance
@@ -34,7 +37,7 @@ _VERY_PARABOLIC = 1e-5
 
 
 @kernel
-def _time_of_flight(x, lam, q, turns):
+def _time_of_flight(x: float, lam: float, q: float, turns: float) -> tuple[float, float]:
     """Return T(x) and y; `q` is 1 - lambda^2, `turns` the number of revolutions times pi."""
     y = math.sqrt(lam * lam * x * x + q)
     # eta = y - lambda x without cancellation (y^2 - lambda^2 x^2 = q).
@@ -62,7 +65,17 @@ def _time_of_flight(x, lam, q, turns):
 
 
 @kernel
-def _solve(x, low, high, rising, target, lam, q, turns, tolerance):
+def _solve(
+    x: float,
+    low: float,
+    high: float,
+    rising: bool,
+    target: float,
+    lam: float,
+    q: float,
+    turns: float,
+    tolerance: float,
+) -> float:
     """Return x with T(x) = `target` on a branch that is monotonic between `low` and `high`."""
     lam2 = lam * lam
     lam3 = lam2 * lam
@@ -101,7 +114,7 @@ def _solve(x, low, high, rising, target, lam, q, turns, tolerance):
 
 
 @kernel
-def _least_time(lam, q, turns):
+def _least_time(lam: float, q: float, turns: float) -> tuple[float, float]:
     """Return x and T where T(x) is least, for one revolution or more (Halley on T' = 0)."""
     lam3 = lam * lam * lam
     low = 0.0
@@ -129,7 +142,9 @@ def _least_time(lam, q, turns):
 
 
 @kernel
-def lambert(r1, r2, tof, max_revs, mu, v1, v2):
+def lambert(
+    r1: _Array, r2: _Array, tof: float, max_revs: int, mu: float, v1: _Array, v2: _Array
+) -> None:
     """Solve Lambert's problem, prograde (angular momentum with z >= 0), for all branches.
 
     Parameters
@@ -234,7 +249,9 @@ def lambert(r1, r2, tof, max_revs, mu, v1, v2):
 
 
 @kernel
-def lambert_batch(r1, r2, tof, max_revs, mu):
+def lambert_batch(
+    r1: _Array, r2: _Array, tof: _Array, max_revs: int, mu: float
+) -> tuple[_Array, _Array]:
     """Return v1, v2 (n, 1 + 2 max_revs, 3) for r1, r2 (n, 3) and tof (n,); see `lambert`."""
     n = r1.shape[0]
     v1 = np.empty((n, 1 + 2 * max_revs, 3))

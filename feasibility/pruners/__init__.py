@@ -1,0 +1,56 @@
+"""Pruners: they decide which candidate legs are worth a full optimisation.
+
+| pruner | keeps a leg if |
+|---|---|
+| `KeepAll` | always |
+| `LambertPruner` | its best Lambert delta-v is within the engine's means |
+| `MimaPruner` | MIMA, a closed-form maximum initial mass, reaches its mass |
+| `Mima2Pruner` | MIMA2, the same with gravity along the arc, reaches its mass |
+| `AllOf` | all its pruners keep it, cheap ones asked first |
+
+A pruner of one's own is any object with a method `keep(legs) -> (n,) bool` that
+honours the contract of `Pruner`: row-wise, pure, picklable. `check_pruner`
+tests just that and raises `PrunerContractError` with one line that says what is
+wrong:
+
+>>> from dataclasses import dataclass
+>>> import numpy as np
+>>> @dataclass(frozen=True)
+... class NearbyOnly:
+...     limit_m: float
+...     name = "nearby-only"
+...     def keep(self, legs, /):
+...         gap = legs.rv_arr[:, :3] - legs.rv_dep[:, :3]
+...         return np.linalg.norm(gap, axis=1) < self.limit_m
+>>> class Fickle:
+...     def keep(self, legs, /):
+...         return np.arange(len(legs)) % 2 == 0
+>>> try:
+...     check_pruner(Fickle())
+... except PrunerContractError as error:
+...     print(error)
+Fickle.keep: not row-wise: a leg gets another answer when the legs are reversed
+
+`NearbyOnly` passes (where its class can be imported, so that it can be pickled),
+and goes wherever a pruner is asked for, also inside `AllOf`.
+"""
+
+from feasibility.pruners.all_of import AllOf, pruner_name
+from feasibility.pruners.check import PrunerContractError, check_pruner
+from feasibility.pruners.keep_all import KeepAll
+from feasibility.pruners.lambert import LambertPruner
+from feasibility.pruners.mima import MimaPruner
+from feasibility.pruners.mima2 import Mima2Pruner
+from feasibility.pruners.protocol import Pruner
+
+__all__ = [
+    "AllOf",
+    "KeepAll",
+    "LambertPruner",
+    "Mima2Pruner",
+    "MimaPruner",
+    "Pruner",
+    "PrunerContractError",
+    "check_pruner",
+    "pruner_name",
+]

@@ -1,0 +1,71 @@
+"""`LambertPruner`: the two-impulse delta-v against what the engine can give."""
+
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.errors import InputError
+from feasibility.legs import Legs
+from feasibility.orbits.mima import lambert_delta_v
+
+
+@final
+@dataclass(frozen=True)
+class LambertPruner:
+    """Keeps a leg whose cheapest Lambert arc is within the engine's means.
+
+    The engine at full thrust for the whole time of flight gives
+    v_e ln(m0 / (m0 - F T / v_e)) (Tsiolkovsky's equation), and without limit
+    where it would burn all of m0. A leg survives where the sum of both impulses
+    on its best Lambert branch is at most `factor` times that, and where the
+    propellant for this sum leaves at least the dry mass.
+
+    Parameters
+    ----------
+    factor : float
+        Largest ratio of Lambert delta-v to available delta-v. Impulses cost less
+        than low thrust on short legs, so 1 is generous there; near 0 and 180
+        degrees, where Lambert's plane is singular, they cost far more, and
+        legs that can be flown are lost at any factor near 1.
+    max_revs : int
+        Largest number of complete revolutions of a Lambert arc.
+
+    Raises
+    ------
+    InputError
+        `factor` is not positive, or `max_revs` is negative.
+
+    Examples
+    --------
+    >>> LambertPruner(factor=0.8).name
+    'lambert'
+    """
+
+    factor: float = 1.0
+    max_revs: int = 2
+
+    def __post_init__(self) -> None:
+        if not self.factor > 0:
+            raise InputError(f"LambertPruner factor: {self.factor}, expected more than zero")
+        if self.max_revs < 0:
+            raise InputError(f"LambertPruner max_revs: {self.max_revs}, expected zero or more")
+
+    @property
+    def name(self) -> str:
+        """Name in counters and reports."""
+        return "lambert"
+
+    def keep(self, legs: Legs, /) -> NDArray[np.bool_]:
+        """Return (n,) bool, True where the leg survives."""
+        needed = lambert_delta_v(legs.rv_dep, legs.rv_arr, legs.tof_s, self.max_revs)
+        burnt = legs.thrust * legs.tof_s / (legs.exhaust_velocity * legs.m0)
+        available = np.full(len(legs), np.inf)
+        limited = burnt < 1.0
+        available[limited] = -legs.exhaust_velocity[limited] * np.log1p(-burnt[limited])
+        final_mass = legs.m0 * np.exp(-needed / legs.exhaust_velocity)
+        # Where no arc exists the need is infinite, and so may be the supply.
+        return (
+            np.isfinite(needed) & (needed <= self.factor * available) & (final_mass >= legs.m_dry)
+        )
