@@ -1,0 +1,39 @@
+"""Compiled kernels are announced once, cached on disk and shared by processes."""
+
+import os
+import subprocess
+import sys
+import time
+
+PROGRAM = """
+import numpy as np
+from feasibility.orbits.kepler_kernels import propagate_batch, propagate_stm_batch
+from feasibility.orbits.lambert import lambert
+from feasibility.orbits.mima import mima, mima2
+state = np.array([[1.0, 0, 0, 0, 1.0, 0]])
+other = np.array([[0, 1.1, 0, -1.0, 0, 0.1]])
+propagate_batch(state, np.ones(1), 1.0)
+propagate_stm_batch(state, np.ones(1), 1.0)
+lambert(state[:, :3], other[:, :3], [1.5], 1, 1.0)
+mima(state, other, 1.5, 1.0, 1.0, mu=1.0)
+mima2(state, other, 1.5, 1.0, 1.0, mu=1.0)
+"""
+
+
+def test_second_process_compiles_nothing(tmp_path):
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
+    errors, seconds = [], []
+    for _ in range(2):
+        start = time.monotonic()
+        result = subprocess.run(
+            [sys.executable, "-c", PROGRAM],
+            env=environment,
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        seconds.append(time.monotonic() - start)
+        errors.append(result.stderr)
+    assert errors[0].count("compiling numeric kernels") == 1
+    assert errors[1] == ""
+    assert seconds[1] < seconds[0] < 60
