@@ -46,7 +46,7 @@ class Nodes:
     @property
     def rank(self) -> int:
         """Legs flown so far."""
-        return self.visited.shape[1] - 1
+        return int(self.visited.shape[1]) - 1
 
     def take(self, index: NDArray[np.intp]) -> Self:
         """Return the nodes at the given positions."""

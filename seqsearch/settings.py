@@ -103,4 +103,4 @@ class SearchSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
         steps = round((self.tof_days_max - self.tof_days_min) / self.tof_days_step)
         if steps > 10_000:
             raise InputError(f"search: {steps} flight times per target, expected at most 10000")
-        return self.tof_days_min + self.tof_days_step * np.arange(steps + 1)
+        return self.tof_days_min + self.tof_days_step * np.arange(steps + 1, dtype=np.float64)
