@@ -208,21 +208,10 @@ def propagate(rv: _Array, dt: float, mu: float, out: _Array) -> None:
 
 
 @kernel
-def propagate_stm(rv: _Array, dt: float, mu: float, out: _Array, stm: _Array) -> None:
-    """Write the state after `dt` of Keplerian motion and its derivative.
-
-    Parameters
-    ----------
-    rv : (6,) float64, m and m/s
-        State; not changed unless it is also `out`.
-    dt : float, s
-        Of either sign, any number of revolutions.
-    mu : float, m3/s2
-    out : (6,) float64, m and m/s
-        Receives the final state; may be `rv` itself.
-    stm : (6, 6) float64
-        Receives d(out) / d(rv), rows by final state, SI.
-    """
+def _propagate_stm(
+    rv: _Array, dt: float, mu: float, out: _Array, stm: _Array, velocity_rows: bool
+) -> None:
+    """See `propagate_stm`; the rows of the final velocity are optional."""
     p0 = (rv[0], rv[1], rv[2])
     v0 = (rv[3], rv[4], rv[5])
     r0 = math.sqrt(p0[0] * p0[0] + p0[1] * p0[1] + p0[2] * p0[2])
@@ -264,6 +253,13 @@ def propagate_stm(rv: _Array, dt: float, mu: float, out: _Array, stm: _Array) ->
         rr_dv = r * dv[i] / mu
         rv_v0 = (r0 * one_f * (p[i] - p0[i]) + c * v[i]) / mu
         rv_p0 = -r0 * one_f * dv[i] / mu
+        for j in range(3):
+            stm[i, j] = rr_dv * dv[j] + rr_p0 * p0[j]
+            stm[i, 3 + j] = rv_v0 * v0[j] + rv_p0 * p0[j]
+        stm[i, i] += f
+        stm[i, 3 + i] += g
+        if not velocity_rows:
+            continue
         vr_p0 = -dv[i] / r02 - mu * c * p[i] / (r * r2 * r0 * r02)
         vr_dv = -p[i] / r2 + ft * w / (mu * r)
         vr_p = -ft * p[i] / r2
@@ -271,17 +267,38 @@ def propagate_stm(rv: _Array, dt: float, mu: float, out: _Array, stm: _Array) ->
         vv_v0 = -c * p[i] / (r * r2)
         vv_dv = r0 * dv[i] / mu
         for j in range(3):
-            stm[i, j] = rr_dv * dv[j] + rr_p0 * p0[j]
-            stm[i, 3 + j] = rv_v0 * v0[j] + rv_p0 * p0[j]
             stm[3 + i, j] = vr_p0 * p0[j] + vr_dv * dv[j] + vr_p * p[j]
             stm[3 + i, 3 + j] = vv_dv * dv[j] + vv_p0 * p0[j] + vv_v0 * v0[j]
-        stm[i, i] += f
-        stm[i, 3 + i] += g
         stm[3 + i, i] += ft
         stm[3 + i, 3 + i] += gt
     for i in range(3):
         out[i] = p[i]
         out[3 + i] = v[i]
+
+
+@kernel
+def propagate_stm(rv: _Array, dt: float, mu: float, out: _Array, stm: _Array) -> None:
+    """Write the state after `dt` of Keplerian motion and its derivative.
+
+    Parameters
+    ----------
+    rv : (6,) float64, m and m/s
+        State; not changed unless it is also `out`.
+    dt : float, s
+        Of either sign, any number of revolutions.
+    mu : float, m3/s2
+    out : (6,) float64, m and m/s
+        Receives the final state; may be `rv` itself.
+    stm : (6, 6) float64
+        Receives d(out) / d(rv), rows by final state, SI.
+    """
+    _propagate_stm(rv, dt, mu, out, stm, True)
+
+
+@kernel
+def propagate_position_stm(rv: _Array, dt: float, mu: float, out: _Array, stm: _Array) -> None:
+    """Do as `propagate_stm`, but write only the rows of the final position, 0 to 2, of `stm`."""
+    _propagate_stm(rv, dt, mu, out, stm, False)
 
 
 @kernel

@@ -27,14 +27,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.jit import kernel
-from feasibility.orbits.kepler_kernels import propagate_stm
+from feasibility.orbits.kepler_kernels import propagate_position_stm
 from feasibility.orbits.lambert_kernels import lambert
 
 _Array = NDArray[np.float64]
 _Scratch = tuple[_Array, _Array, _Array]
 
 _MAX_EVALUATIONS = 80
-_TOLERANCE = 1e-13
+_TOLERANCE = 1e-12
 
 
 @kernel
@@ -44,8 +44,8 @@ def mass_from_acceleration(a: float, tof: float, thrust: float, exhaust_velocity
 
 
 @kernel
-def mima_acceleration(dv1: _Array, dv2: _Array, tof: float) -> float:
-    """Return the acceleration of MIMA in m/s2 for two impulses (3,) m/s.
+def mima_acceleration(dv1: _Array, dv2: _Array, tof: float) -> tuple[float, float]:
+    """Return the acceleration of MIMA in m/s2 for two impulses (3,) m/s, and t1 / T.
 
     With D = dv1 + dv2, E = dv1 - dv2 and x = t1 / T, the two conditions (same
     change of velocity and of position) give a1 T = D + E / x and
@@ -63,11 +63,11 @@ def mima_acceleration(dv1: _Array, dv2: _Array, tof: float) -> float:
         de += d * e
         ee += e * e
     if ee == 0.0:
-        return math.sqrt(dd) / tof
+        return math.sqrt(dd) / tof, 0.5
     k = 2.0 * de / ee
     root = math.sqrt(k * k + 4.0)
     x = 2.0 / (2.0 + (4.0 / (root + k) if k > 0.0 else root - k))
-    return math.sqrt(dd + 2.0 * de / x + ee / (x * x)) / tof
+    return math.sqrt(dd + 2.0 * de / x + ee / (x * x)) / tof, x
 
 
 @kernel
@@ -95,7 +95,7 @@ def _accelerations(
             time, w1, w2 = x * tof, first, second
         else:
             time, w1, w2 = 0.5 * (1.0 + x) * tof, 0.0, 4.0 * second
-        propagate_stm(rv, time, mu, state, stm)
+        propagate_position_stm(rv, time, mu, state, stm)
         for i in range(3):
             for j in range(3):
                 position = -stm[j, 3 + i] / tof
@@ -147,7 +147,7 @@ def mima2_acceleration(
     """Return the acceleration of MIMA2 in m/s2.
 
     The switching time is searched on the relative difference of the magnitudes,
-    which falls from 1 to -1, by Chandrupatla's method (1997, "A new hybrid
+    which falls from 1 to -1, from MIMA's on, by Chandrupatla's method (1997, "A new hybrid
     quadratic/bisection algorithm for finding the zero of a nonlinear function
     without using derivatives"). Several switching times may be right, mostly on
     long or expensive transfers; then another search, such as pykep's, may end
@@ -170,7 +170,7 @@ def mima2_acceleration(
         NaN where the search meets a singular system.
     """
     _, state, stm = scratch
-    propagate_stm(rv, tof, mu, state, stm)
+    propagate_position_stm(rv, tof, mu, state, stm)
     for i in range(3):
         rhs[i] = 0.0
         rhs[3 + i] = dv1[i]
@@ -182,7 +182,8 @@ def mima2_acceleration(
     # At both ends one acceleration is unbounded, so that their relative difference is known.
     x1, f1 = 1.0, -1.0
     x2, f2 = 0.0, 1.0
-    t = 0.5
+    _, x = mima_acceleration(dv1, dv2, tof)
+    t = 1.0 - min(max(x, 0.1), 0.9)
     mean = np.nan
     for _ in range(_MAX_EVALUATIONS):
         x = x1 + t * (x2 - x1)
@@ -250,6 +251,6 @@ def maximum_mass_batch(
             if refined:
                 a = mima2_acceleration(rv, dv1, dv2, tof[i], mu, rhs, end, scratch)
             else:
-                a = mima_acceleration(dv1, dv2, tof[i])
+                a, _ = mima_acceleration(dv1, dv2, tof[i])
             out[i, b] = mass_from_acceleration(a, tof[i], thrust[i], exhaust_velocity[i])
     return out
