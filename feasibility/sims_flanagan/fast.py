@@ -1,7 +1,6 @@
 """Fast batch solver for the maximum initial mass of Sims-Flanagan legs."""
 
 import time
-from typing import Final
 
 import numpy as np
 from numpy.random import Generator
@@ -17,8 +16,16 @@ from feasibility.sims_flanagan.solutions import (
     Status,
 )
 
+RANDOM_PATH_SPREAD = 0.1 / np.array([1.0, 2.0, 3.0])
 
-def fast_max_initial_mass(legs: Legs, *, n_segments: int = N_SEGMENTS) -> LegSolutions:
+
+def fast_max_initial_mass(
+    legs: Legs,
+    *,
+    n_segments: int = N_SEGMENTS,
+    extra_random_starts: int = 0,
+    rng: Generator | None = None,
+) -> LegSolutions:
     """Return the maximum initial mass of each leg.
 
     Parameters
@@ -27,6 +34,10 @@ def fast_max_initial_mass(legs: Legs, *, n_segments: int = N_SEGMENTS) -> LegSol
         n legs; their initial and dry masses play no part.
     n_segments : int
         Number of segments, s.
+    extra_random_starts : int
+        Further starts along randomly bent paths.
+    rng : numpy.random.Generator, optional
+        Their randomness; seed 0 unless given.
 
     Returns
     -------
@@ -40,7 +51,8 @@ def fast_max_initial_mass(legs: Legs, *, n_segments: int = N_SEGMENTS) -> LegSol
     z = np.full(n, np.inf)
     start = np.full(n, -1, dtype=np.int64)
     ratio = np.zeros(n)
-    infos = np.zeros((n, 40))
+    rng = np.random.default_rng(0) if rng is None else rng
+    shapes = RANDOM_PATH_SPREAD * rng.standard_normal((n, extra_random_starts, 5, 3))
     began = time.perf_counter()
     maximum_batch(
         legs.rv_dep,
@@ -49,8 +61,7 @@ def fast_max_initial_mass(legs: Legs, *, n_segments: int = N_SEGMENTS) -> LegSol
         legs.exhaust_velocity,
         n_segments,
         MU_SUN,
-        3.0,
-        infos,
+        shapes,
         throttles,
         z,
         start,

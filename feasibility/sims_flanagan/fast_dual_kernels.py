@@ -1,189 +1,34 @@
-"""Building blocks of the fast leg solvers: elements, mass profile, linearised arc, dual.
-
-Everything here is scaled: mu = 1, lengths in units of the departure radius.
-Kernels work on one leg, on preallocated contiguous float64 arrays.
-
-A leg of s segments is a chain of Kepler arcs with an impulse dv_i at the centre
-of each segment (Sims and Flanagan 1999, "Preliminary design of low-thrust
-interplanetary missions"). The arc is shot forward from the departure state and
-its end compared with the target in equinoctial elements with the mean longitude
-(n, e cos, e sin, h, k, l): under Kepler motion only l changes, linearly, so the
-map from impulses to this gap is much closer to linear than in Cartesian
-coordinates, and a whole revolution more or less is 2 pi in one component.
-"""
+"""The linearised leg: least thrust that closes a gap, by its six-dimensional dual."""
 
 import math
 
 import numpy as np
 
 from feasibility.jit import kernel
-from feasibility.orbits.kepler_kernels import propagate, propagate_stm
+from feasibility.sims_flanagan.fast_algebra_kernels import (
+    cholesky,
+    solve_lower,
+    solve_lower_transposed,
+)
+from feasibility.sims_flanagan.fast_workspace_kernels import (
+    HESSIAN,
+    HESSIAN_LOWER,
+    NORM,
+    PINNED,
+    PRIMER,
+    SLOPE,
+    THRUST,
+    TRIAL_NORM,
+    TRIAL_PRIMER,
+    TURNED,
+    Y,
+)
 
-_TWO_PI = 2.0 * math.pi
-_STEP = 1e-5
 _DUAL_ITERATIONS = 40
 _SOFTNESS = 1e-3
 _FULL = 0.995
 _LARGEST = 2.0
 _BACKWARD_LIMIT = 0.367
-
-
-@kernel
-def cholesky(a, lower):
-    """Write the lower Cholesky factor of the (6, 6) matrix `a`; return whether it exists."""
-    for i in range(6):
-        for j in range(i + 1):
-            total = a[i, j]
-            for k in range(j):
-                total -= lower[i, k] * lower[j, k]
-            if i == j:
-                if not total > 0.0:
-                    return False
-                lower[i, i] = math.sqrt(total)
-            else:
-                lower[i, j] = total / lower[j, j]
-    return True
-
-
-@kernel
-def solve_lower(lower, b):
-    """Overwrite `b` (6,) with the solution of L x = b."""
-    for i in range(6):
-        total = b[i]
-        for k in range(i):
-            total -= lower[i, k] * b[k]
-        b[i] = total / lower[i, i]
-
-
-@kernel
-def solve_lower_transposed(lower, b):
-    """Overwrite `b` (6,) with the solution of L^T x = b."""
-    for i in range(5, -1, -1):
-        total = b[i]
-        for k in range(i + 1, 6):
-            total -= lower[k, i] * b[k]
-        b[i] = total / lower[i, i]
-
-
-@kernel
-def to_elements(x, e):
-    """Write the elements (n, ex, ey, h, k, l) of the state `x`; return False if not elliptic.
-
-    Equinoctial elements (Broucke and Cefola 1972) with the mean motion n in
-    place of the semi-major axis; h + ik = tan(i/2) exp(i node).
-    """
-    r = math.sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2])
-    hx = x[1] * x[5] - x[2] * x[4]
-    hy = x[2] * x[3] - x[0] * x[5]
-    hz = x[0] * x[4] - x[1] * x[3]
-    hh = math.sqrt(hx * hx + hy * hy + hz * hz)
-    alpha = 2.0 / r - (x[3] * x[3] + x[4] * x[4] + x[5] * x[5])
-    if not alpha > 1e-6 or not hh + hz > 1e-6 * hh:
-        return False
-    a = 1.0 / alpha
-    h = -hy / (hh + hz)
-    k = hx / (hh + hz)
-    s2 = 1.0 + h * h + k * k
-    f0 = (1.0 + h * h - k * k) / s2
-    f1 = 2.0 * h * k / s2
-    f2 = -2.0 * k / s2
-    g1 = (1.0 - h * h + k * k) / s2
-    g2 = 2.0 * h / s2
-    ecx = x[4] * hz - x[5] * hy - x[0] / r
-    ecy = x[5] * hx - x[3] * hz - x[1] / r
-    ecz = x[3] * hy - x[4] * hx - x[2] / r
-    ex = ecx * f0 + ecy * f1 + ecz * f2
-    ey = ecx * f1 + ecy * g1 + ecz * g2
-    px = x[0] * f0 + x[1] * f1 + x[2] * f2
-    py = x[0] * f1 + x[1] * g1 + x[2] * g2
-    eta2 = 1.0 - ex * ex - ey * ey
-    if not eta2 > 1e-10:
-        return False
-    eta = math.sqrt(eta2)
-    b = 1.0 / (1.0 + eta)
-    cos_f = ex + ((1.0 - ex * ex * b) * px - ex * ey * b * py) / (a * eta)
-    sin_f = ey + ((1.0 - ey * ey * b) * py - ex * ey * b * px) / (a * eta)
-    e[0] = alpha * math.sqrt(alpha)
-    e[1] = ex
-    e[2] = ey
-    e[3] = h
-    e[4] = k
-    e[5] = math.atan2(sin_f, cos_f) - ex * sin_f + ey * cos_f
-    return True
-
-
-@kernel
-def from_elements(e, x):
-    """Write the state of the elements (n, ex, ey, h, k, l)."""
-    ex, ey, h, k = e[1], e[2], e[3], e[4]
-    f = e[5]
-    for _ in range(20):
-        s = math.sin(f)
-        c = math.cos(f)
-        step = (e[5] - f - ey * c + ex * s) / (1.0 - ex * c - ey * s)
-        f += min(1.0, max(-1.0, step))
-        if abs(step) < 1e-13 * (1.0 + abs(f)):
-            break
-    s = math.sin(f)
-    c = math.cos(f)
-    a = e[0] ** (-2.0 / 3.0)
-    b = 1.0 / (1.0 + math.sqrt(1.0 - ex * ex - ey * ey))
-    na_r = e[0] * a / (1.0 - ex * c - ey * s)
-    px = a * ((1.0 - ey * ey * b) * c + ex * ey * b * s - ex)
-    py = a * ((1.0 - ex * ex * b) * s + ex * ey * b * c - ey)
-    vx = na_r * (ex * ey * b * c - (1.0 - ey * ey * b) * s)
-    vy = na_r * ((1.0 - ex * ex * b) * c - ex * ey * b * s)
-    s2 = 1.0 + h * h + k * k
-    f0 = (1.0 + h * h - k * k) / s2
-    f1 = 2.0 * h * k / s2
-    f2 = -2.0 * k / s2
-    g1 = (1.0 - h * h + k * k) / s2
-    g2 = 2.0 * h / s2
-    x[0] = px * f0 + py * f1
-    x[1] = px * f1 + py * g1
-    x[2] = px * f2 + py * g2
-    x[3] = vx * f0 + vy * f1
-    x[4] = vx * f1 + vy * g1
-    x[5] = vx * f2 + vy * g2
-
-
-@kernel
-def wrap(angle):
-    """Return the angle moved by whole turns into [-pi, pi]."""
-    return angle - _TWO_PI * np.rint(angle / _TWO_PI)
-
-
-@kernel
-def element_gap(x, target, gap):
-    """Write elements of `x` minus `target`, longitude wrapped; return False if not elliptic."""
-    if not to_elements(x, gap):
-        return False
-    for i in range(6):
-        gap[i] -= target[i]
-    gap[5] = wrap(gap[5])
-    return True
-
-
-@kernel
-def element_derivatives(x, first, columns, plus, minus, shifted):
-    """Write d(elements)/d(x) for components `first`.. into columns 0.. of `columns` (6, >= 6-first).
-
-    Central differences: their error of 1e-10 only slows a Newton iteration.
-    """
-    for i in range(6):
-        shifted[i] = x[i]
-    for j in range(first, 6):
-        shifted[j] = x[j] + _STEP
-        if not to_elements(shifted, plus):
-            return False
-        shifted[j] = x[j] - _STEP
-        if not to_elements(shifted, minus):
-            return False
-        shifted[j] = x[j]
-        for i in range(5):
-            columns[i, j - first] = (plus[i] - minus[i]) / (2.0 * _STEP)
-        columns[5, j - first] = wrap(plus[5] - minus[5]) / (2.0 * _STEP)
-    return True
 
 
 @kernel
@@ -244,28 +89,6 @@ def z_of_impulses(dv, n, n_forward, c):
 
 
 @kernel
-def shoot(x0, dv, n, dt, x):
-    """Write into `x` the end of the arc from `x0` with the impulses `dv`."""
-    propagate(x0, 0.5 * dt, 1.0, x)
-    for i in range(n):
-        x[3] += dv[i, 0]
-        x[4] += dv[i, 1]
-        x[5] += dv[i, 2]
-        propagate(x, dt if i < n - 1 else 0.5 * dt, 1.0, x)
-
-
-@kernel
-def shoot_stm(x0, dv, n, dt, x, stm):
-    """As `shoot`; also writes the transition matrix (n, 6, 6) of each arc after an impulse."""
-    propagate(x0, 0.5 * dt, 1.0, x)
-    for i in range(n):
-        x[3] += dv[i, 0]
-        x[4] += dv[i, 1]
-        x[5] += dv[i, 2]
-        propagate_stm(x, dt if i < n - 1 else 0.5 * dt, 1.0, x, stm[i])
-
-
-@kernel
 def whiten(b, n, gram, lower):
     """Overwrite each b_i (6, 3) with L^-1 b_i, where L L^T = sum b_i b_i^T; return whether it can.
 
@@ -292,26 +115,6 @@ def whiten(b, n, gram, lower):
 
 
 @kernel
-def sensitivities(stm, end_jacobian, n, b, m, m_next):
-    """Write b_i (6, 3) = d(end elements)/d(dv_i) from the arcs' matrices, last arc first."""
-    for i in range(6):
-        for j in range(6):
-            m[i, j] = end_jacobian[i, j]
-    for k in range(n - 1, -1, -1):
-        for i in range(6):
-            for j in range(6):
-                total = 0.0
-                for col in range(6):
-                    total += m[i, col] * stm[k, col, j]
-                m_next[i, j] = total
-        for i in range(6):
-            for j in range(6):
-                m[i, j] = m_next[i, j]
-            for j in range(3):
-                b[k, i, j] = m[i, 3 + j]
-
-
-@kernel
 def _primers(b, lam, n, thrust, pinned, primer, norm):
     """Write b_i^T lam and the softened norms sqrt(|b_i^T lam|^2 + eps^2).
 
@@ -330,7 +133,7 @@ def _primers(b, lam, n, thrust, pinned, primer, norm):
         mean += total
     eps2 = _SOFTNESS * _SOFTNESS * mean / n
     for i in range(n):
-        if pinned[i]:
+        if pinned[i] > 0.0:
             norm[i] = 0.0
             for j in range(3):
                 norm[i] += primer[i, j] * thrust[i, j]
@@ -363,12 +166,12 @@ def _curvature(b, n, c, y, primer, norm, thrust, pinned, lam, h, grad, turned):
             h[i, j] = 0.0
     for k in range(n):
         u0, u1, u2 = thrust[k, 0], thrust[k, 1], thrust[k, 2]
-        if pinned[k]:
+        if pinned[k] > 0.0:
             for i in range(6):
                 grad[i] += c * y[k] * (b[k, i, 0] * u0 + b[k, i, 1] * u1 + b[k, i, 2] * u2)
             continue
         inverse = 1.0 / norm[k]
-        w = c * y[k] * inverse
+        weight = c * y[k] * inverse
         p0, p1, p2 = primer[k, 0] * inverse, primer[k, 1] * inverse, primer[k, 2] * inverse
         for i in range(6):
             b0, b1, b2 = b[k, i, 0], b[k, i, 1], b[k, i, 2]
@@ -378,7 +181,7 @@ def _curvature(b, n, c, y, primer, norm, thrust, pinned, lam, h, grad, turned):
             turned[1, i] = turn
             grad[i] += c * y[k] * along
             for j in range(i + 1):
-                h[i, j] += w * (
+                h[i, j] += weight * (
                     b0 * b[k, j, 0]
                     + b1 * b[k, j, 1]
                     + b2 * b[k, j, 2]
@@ -395,9 +198,12 @@ def _curvature(b, n, c, y, primer, norm, thrust, pinned, lam, h, grad, turned):
 
 
 @kernel
-def _climb(b, gap, n, n_forward, c, lam, z, pinned, scratch, info):
+def _climb(b, gap, n, n_forward, c, lam, z, w):
     """Raise z(lam) by damped Newton steps from `lam` (norm 1); return z, -1 where it fails."""
-    primer, norm, trial_primer, trial_norm, y, slope, h, lower, thrust, turned = scratch
+    primer, trial_primer, thrust = w.n3[PRIMER], w.n3[TRIAL_PRIMER], w.n3[THRUST]
+    norm, trial_norm, y, slope = w.s[NORM], w.s[TRIAL_NORM], w.s[Y], w.s[SLOPE]
+    pinned = w.s[PINNED]
+    h, lower, turned = w.m[HESSIAN], w.m[HESSIAN_LOWER], w.m[TURNED]
     grad, step, trial = turned[2], turned[3], turned[4]
     work = 0.0
     for i in range(6):
@@ -405,11 +211,10 @@ def _climb(b, gap, n, n_forward, c, lam, z, pinned, scratch, info):
     _primers(b, lam, n, thrust, pinned, primer, norm)
     z = _bound(norm, work, z, n, n_forward, c, y, slope)
     for i in range(n):
-        if not pinned[i]:
+        if pinned[i] == 0.0:
             for j in range(3):
                 thrust[i, j] = primer[i, j] / norm[i]
     for _ in range(_DUAL_ITERATIONS):
-        info[5] += 1
         for i in range(6):
             grad[i] = -gap[i]
         _curvature(b, n, c, y, primer, norm, thrust, pinned, lam, h, grad, turned)
@@ -450,7 +255,7 @@ def _climb(b, gap, n, n_forward, c, lam, z, pinned, scratch, info):
         if not better:
             break
         for k in range(n):
-            if not pinned[k]:
+            if pinned[k] == 0.0:
                 _turn_thrust(b[k], step, fraction, primer[k], norm[k], thrust[k])
         z = trial_z
         work = trial_work
@@ -534,7 +339,7 @@ def _pin_direction(b, lower, turned, u):
 
 
 @kernel
-def least_thrust(b, gap, n, n_forward, c, lam, z, now, dv, pinned, scratch, info):
+def least_thrust(b, gap, n, n_forward, c, lam, z, now, dv, w):
     """Solve: least z with sum b_i dv_i = gap and |dv_i| = c y_i(z); write dv; return z or -1.
 
     The dual is the largest z(lam) over 6-vectors lam, where z(lam) solves
@@ -551,7 +356,9 @@ def least_thrust(b, gap, n, n_forward, c, lam, z, now, dv, pinned, scratch, info
     `b` and `gap` are whitened; `lam` holds the first guess and receives the
     solution, norm 1.
     """
-    primer, norm, _, _, y, slope, h, lower, thrust, turned = scratch
+    primer, thrust = w.n3[PRIMER], w.n3[THRUST]
+    norm, y, pinned = w.s[NORM], w.s[Y], w.s[PINNED]
+    h, lower, turned = w.m[HESSIAN], w.m[HESSIAN_LOWER], w.m[TURNED]
     z = min(z, 0.5 / n) if z > 0.0 else 0.5 / n
     work = 0.0
     for i in range(6):
@@ -568,8 +375,8 @@ def least_thrust(b, gap, n, n_forward, c, lam, z, now, dv, pinned, scratch, info
     for i in range(6):
         lam[i] /= size
     for i in range(n):
-        pinned[i] = False
-    z = _climb(b, gap, n, n_forward, c, lam, z, pinned, scratch, info)
+        pinned[i] = 0.0
+    z = _climb(b, gap, n, n_forward, c, lam, z, w)
     if not z > 0.0:
         return -1.0
     some = False
@@ -579,27 +386,26 @@ def least_thrust(b, gap, n, n_forward, c, lam, z, now, dv, pinned, scratch, info
             thrust[i, j] = primer[i, j] / norm[i]
             total += thrust[i, j] ** 2
         if total < _FULL * _FULL:
-            pinned[i] = True
+            pinned[i] = 1.0
             some = True
     if some:
-        info[7] += 1
         _curvature(b, n, c, y, primer, norm, thrust, pinned, lam, h, turned[5], turned)
         if not cholesky(h, lower):
             return -1.0
         for i in range(n):
-            if pinned[i]:
+            if pinned[i] > 0.0:
                 size = 1e-300
                 for j in range(3):
                     size += abs(now[i, j])
                 for j in range(3):
                     thrust[i, j] += 1e-7 * now[i, j] / size
                 _pin_direction(b[i], lower, turned, thrust[i])
-        z = _climb(b, gap, n, n_forward, c, lam, z, pinned, scratch, info)
+        z = _climb(b, gap, n, n_forward, c, lam, z, w)
         if not z > 0.0:
             return -1.0
     for i in range(n):
         for j in range(3):
-            if not pinned[i]:
+            if pinned[i] == 0.0:
                 thrust[i, j] = primer[i, j] / norm[i]
             dv[i, j] = c * y[i] * thrust[i, j]
     return z

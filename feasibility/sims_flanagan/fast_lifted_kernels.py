@@ -1,0 +1,226 @@
+"""Paths drawn in element space, bent to arcs by lifted Newton steps."""
+
+import math
+
+import numpy as np
+
+from feasibility.jit import kernel
+from feasibility.sims_flanagan.fast_algebra_kernels import (
+    divide,
+    multiply_lower_transposed,
+    solve_lower,
+    solve_lower_transposed,
+)
+from feasibility.sims_flanagan.fast_dual_kernels import least_thrust, whiten
+from feasibility.sims_flanagan.fast_element_kernels import (
+    element_derivatives,
+    from_elements,
+    to_elements,
+    wrap,
+)
+from feasibility.sims_flanagan.fast_workspace_kernels import (
+    GAP,
+    JUMPS,
+    LINEAR,
+    LOWER,
+    M_ONE,
+    M_TWO,
+    MOVED,
+    PREVIOUS,
+    RESIDUAL,
+    TOTAL,
+    WORK,
+    X,
+)
+
+_TWO_PI = 2.0 * math.pi
+
+
+@kernel
+def draw_path(e0, e1, tof, turns, n, shape, nodes):
+    """Draw the elements before each impulse along a path with a number of turns.
+
+    Linear in time, the mean motion with a parabola on top that makes the mean
+    longitude arrive after the wanted number of turns. Returns the mean longitude
+    at arrival, NaN where the path would need an absurd mean motion.
+
+    `shape` (5, 3) adds sin(k pi t), k = 1, 2, 3 to each element but the longitude.
+    """
+    mean_motion = 0.5 * (e0[0] + e1[0])
+    travel = mean_motion * tof + wrap(e1[5] - e0[5] - mean_motion * tof) + _TWO_PI * turns
+    bump = travel / tof - mean_motion
+    low = min(e0[0], e1[0])
+    high = max(e0[0], e1[0])
+    if turns != 0 and not mean_motion + 1.5 * bump > 0.2 * low:
+        return np.nan
+    for i in range(n):
+        t = (i + 0.5) / n
+        for j in range(1, 5):
+            nodes[i, j] = e0[j] + t * (e1[j] - e0[j])
+        motion = e0[0] + t * (e1[0] - e0[0]) + 6.0 * bump * t * (1.0 - t)
+        for k in range(3):
+            wave = math.sin((k + 1) * math.pi * t)
+            motion += e0[0] * shape[0, k] * wave
+            for j in range(1, 5):
+                nodes[i, j] += shape[j, k] * wave
+        nodes[i, 0] = min(max(motion, 0.5 * low), 2.0 * high)
+        nodes[i, 5] = e0[5] + tof * (
+            e0[0] * t + 0.5 * (e1[0] - e0[0]) * t * t + bump * t * t * (3.0 - 2.0 * t)
+        )
+    return e0[5] + travel
+
+
+@kernel
+def lifted_sweep(e0, e1, longitude, dt, n, n_forward, c, first, relax, nodes, dv, z, lam, w):
+    """Bend a path of nodes and its impulses towards a true arc of least thrust.
+
+    One lifted Newton step: every node is an unknown of its own, condensed to the
+    impulses; in elements the coasts between nodes are exactly linear. Returns the
+    new z, -1 where the step fails, and the largest move of a node, inf where the step
+    had to be shortened.
+    """
+    jumps, moved = w.n6[JUMPS], w.n6[MOVED]
+    b, response = w.b[0], w.b[1]
+    linear, residual = w.n3[LINEAR], w.n3[RESIDUAL]
+    one, two = w.m[M_ONE], w.m[M_TWO]
+    x = w.v[X]
+    gap = w.v[GAP]
+    total = w.v[TOTAL]
+    work = w.v[WORK]
+    # Jump of each node, its derivatives by the impulse and by the node.
+    for i in range(n):
+        from_elements(nodes[i], x)
+        if not first:
+            if not element_derivatives(x, 0, one, w.v):
+                return -1.0, np.inf
+            for j in range(3):
+                x[3 + j] += dv[i, j]
+        if not to_elements(x, jumps[i]):
+            return -1.0, np.inf
+        for j in range(6):
+            jumps[i, j] -= nodes[i, j]
+        jumps[i, 5] = wrap(jumps[i, 5])
+        if first:
+            if not element_derivatives(x, 3, two, w.v):
+                return -1.0, np.inf
+            for j in range(6):
+                for k in range(3):
+                    response[i, j, k] = two[j, k]
+                for k in range(6):
+                    w.m[i, j, k] = 1.0 if j == k else 0.0
+        else:
+            if not element_derivatives(x, 0, two, w.v):
+                return -1.0, np.inf
+            for j in range(6):
+                for k in range(3):
+                    response[i, j, k] = two[j, 3 + k]
+            if not divide(two, one, w.m[i]):
+                return -1.0, np.inf
+    # Condense, last node first: m = d(end)/d(elements after impulse i).
+    for j in range(6):
+        gap[j] = e1[j] - nodes[n - 1, j] - jumps[n - 1, j]
+        for k in range(6):
+            one[j, k] = 1.0 if j == k else 0.0
+    gap[5] = longitude - nodes[n - 1, 5] - jumps[n - 1, 5]
+    one[5, 0] = 0.5 * dt
+    gap[5] -= 0.5 * dt * (nodes[n - 1, 0] + jumps[n - 1, 0])
+    for i in range(n - 1, -1, -1):
+        for j in range(6):
+            for k in range(3):
+                value = 0.0
+                for q in range(6):
+                    value += one[j, q] * response[i, q, k]
+                b[i, j, k] = value
+        for j in range(6):
+            for k in range(6):
+                value = 0.0
+                for q in range(6):
+                    value += one[j, q] * w.m[i, q, k]
+                two[j, k] = value
+        # moved[i]: by how much the flow from the node before misses node i.
+        span = dt if i > 0 else 0.5 * dt
+        for j in range(6):
+            before = nodes[i - 1, j] + jumps[i - 1, j] if i > 0 else e0[j]
+            moved[i, j] = before - nodes[i, j]
+        motion = nodes[i - 1, 0] + jumps[i - 1, 0] if i > 0 else e0[0]
+        moved[i, 5] += motion * span
+        for j in range(6):
+            for k in range(6):
+                one[j, k] = two[j, k]
+                gap[j] -= one[j, k] * moved[i, k]
+            one[j, 0] += one[j, 5] * span
+    for j in range(6):
+        total[j] = gap[j]
+        for i in range(n):
+            for k in range(3):
+                total[j] += b[i, j, k] * dv[i, k]
+    if not whiten(b, n, one, w.m[LOWER]):
+        return -1.0, np.inf
+    solve_lower(w.m[LOWER], total)
+    multiply_lower_transposed(w.m[LOWER], lam)
+    z = least_thrust(b, total, n, n_forward, c, lam, z, dv, linear, w)
+    solve_lower_transposed(w.m[LOWER], lam)
+    if not z > 0.0:
+        return -1.0, np.inf
+    # How the nodes move; half steps where an orbit would open.
+    for j in range(6):
+        work[j] = moved[0, j]
+    change = 0.0
+    size = 0.0
+    for i in range(n):
+        for j in range(6):
+            moved_next = moved[i, j] if i == 0 else work[j] + moved[i, j]
+            moved[i, j] = moved_next
+        for j in range(6):
+            value = 0.0
+            for k in range(6):
+                value += w.m[i, j, k] * moved[i, k]
+            for k in range(3):
+                value += response[i, j, k] * (linear[i, k] - dv[i, k])
+            work[j] = value
+        work[5] += work[0] * dt
+        for k in range(3):
+            residual[i, k] = linear[i, k] - dv[i, k]
+            change += abs(residual[i, k])
+            size += abs(linear[i, k])
+    fraction = relax
+    for _ in range(6):
+        inside = True
+        for i in range(n):
+            ex = nodes[i, 1] + fraction * moved[i, 1]
+            ey = nodes[i, 2] + fraction * moved[i, 2]
+            motion = nodes[i, 0] + fraction * moved[i, 0]
+            if not (ex * ex + ey * ey < 0.9 and 0.1 * e0[0] < motion < 10.0 * e0[0]):
+                inside = False
+        if inside:
+            break
+        fraction *= 0.5
+    if not inside:
+        return -1.0, np.inf
+    for i in range(n):
+        for j in range(6):
+            nodes[i, j] += fraction * moved[i, j]
+        for j in range(3):
+            dv[i, j] += fraction * (linear[i, j] - dv[i, j])
+    return z, change / size
+
+
+@kernel
+def next_relaxation(relax, n, sweep, w):
+    """Return the fraction of the next lifted step by Aitken's rule for vectors.
+
+    Full steps overshoot where the dynamics bend more than the thrust bound does.
+    Irons and Tuck 1969, "A version of the Aitken accelerator for computer iteration".
+    """
+    residual, previous = w.n3[RESIDUAL], w.n3[PREVIOUS]
+    product = 0.0
+    square = 0.0
+    for i in range(n):
+        for k in range(3):
+            difference = residual[i, k] - previous[i, k]
+            product += difference * previous[i, k]
+            square += difference * difference
+            previous[i, k] = residual[i, k]
+    if sweep == 0 or not square > 0.0:
+        return relax
+    return min(max(-relax * product / square, 0.15), 1.0)
