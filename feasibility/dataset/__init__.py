@@ -1,0 +1,23 @@
+"""Datasets of labelled legs: protocols, samplers, generation, reading and splits.
+
+Floor 4 of the house: knows the leg solvers and nothing above them.
+"""
+
+from feasibility.dataset.columns import COLUMNS, Column
+from feasibility.dataset.dataset import Dataset, read_dataset
+from feasibility.dataset.generate import Generation, begin
+from feasibility.dataset.protocol import Protocol, builtin_protocols, read_protocol
+from feasibility.dataset.splits import split_by_pair
+
+__all__ = [
+    "COLUMNS",
+    "Column",
+    "Dataset",
+    "Generation",
+    "Protocol",
+    "begin",
+    "builtin_protocols",
+    "read_dataset",
+    "read_protocol",
+    "split_by_pair",
+]

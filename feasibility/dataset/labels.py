@@ -1,0 +1,225 @@
+"""From a protocol to labelled rows: one shard, a pure function of seed and shard number."""
+
+import functools
+import hashlib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.dataset.columns import ARRIVAL_STATE, DEPARTURE_STATE
+from feasibility.dataset.convergence import converge_from_random_start
+from feasibility.dataset.draws import Columns, Draw
+from feasibility.dataset.impulsive import lowest_delta_v
+from feasibility.dataset.protocol import CatalogueTable, Protocol
+from feasibility.errors import InputError
+from feasibility.legs import Legs
+from feasibility.orbits import Catalogue, read_catalogue, synthetic_main_belt
+from feasibility.sims_flanagan import Status, optimise, solve_max_initial_mass
+
+LAMBERT_REVOLUTIONS: Final = 2
+"""Revolutions of the Lambert branches that the column lambert_dv_m_s compares."""
+
+
+@final
+@dataclass(frozen=True)
+class ShardTask:
+    """All that a worker has to know to make one shard.
+
+    Attributes
+    ----------
+    protocol : Protocol
+        How to draw and label.
+    seed : int
+        Seed of the dataset.
+    shard : int
+        Number of the shard, from 0.
+    rows : int
+        How many of its first rows are wanted, at most ``protocol.legs_per_shard``.
+    catalogue_sha256 : str, optional
+        Digest of the catalogue file as the caller sees it.
+    """
+
+    protocol: Protocol
+    seed: int
+    shard: int
+    rows: int
+    catalogue_sha256: str | None
+
+
+def file_sha256(table: CatalogueTable) -> str | None:
+    """Return the digest of a catalogue file, None for a synthetic belt.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read.
+    """
+    if table.file is None:
+        return None
+    try:
+        return hashlib.sha256(Path(table.file).read_bytes()).hexdigest()
+    except OSError as error:
+        raise InputError(f"{table.file}: cannot be read ({error.strerror})") from None
+
+
+@functools.lru_cache(maxsize=1)
+def load_catalogue(table: CatalogueTable, sha256: str | None) -> Catalogue:
+    """Return the bodies of a protocol; a process keeps the last one.
+
+    Raises
+    ------
+    InputError
+        The file is missing or malformed, or its digest is not `sha256`.
+    """
+    if table.file is None:
+        rng = np.random.default_rng(table.synthetic_seed)
+        return synthetic_main_belt(table.synthetic_bodies, rng)
+    if file_sha256(table) != sha256:
+        raise InputError(f"{table.file}: differs between processes; expected the same file")
+    return read_catalogue(Path(table.file))
+
+
+def make_shard(task: ShardTask) -> Columns:
+    """Draw and label the rows of one shard.
+
+    The rows depend on protocol, seed and shard number alone; a shorter shard
+    is the beginning of the full one.
+
+    Returns
+    -------
+    dict of (rows,) arrays
+        The columns of `columns.COLUMNS`.
+
+    Raises
+    ------
+    InputError
+        The catalogue cannot be used, or the sampler finds hardly a leg.
+    """
+    protocol = task.protocol
+    sequence = np.random.SeedSequence(task.seed, spawn_key=(task.shard,))
+    sampling, boundary, starts = (np.random.default_rng(child) for child in sequence.spawn(3))
+    catalogue = load_catalogue(protocol.catalogue, task.catalogue_sha256)
+    full = protocol.legs_per_shard
+    draw = protocol.sampler.draw(
+        full, sampling, catalogue, protocol.craft(), protocol.impulsive_grid
+    ).head(task.rows)
+    # Drawn for the whole shard even if fewer rows are wanted, so that these stay the same.
+    chosen = boundary.uniform(size=full)[: task.rows] < protocol.boundary_share
+    log_ratio = protocol.boundary_sigma * boundary.standard_normal(full)[: task.rows]
+    if protocol.label == "convergence":
+        labels = _convergence_labels(draw, protocol.solver, starts)
+    else:
+        labels = _margin_labels(draw, protocol, chosen, log_ratio)
+    legs: Legs = labels.pop("legs")
+    return {
+        **_leg_columns(legs, task),
+        "dt_imp_days": draw.dt_imp_days,
+        "lambert_dv_m_s": lowest_delta_v(
+            legs.rv_dep, legs.rv_arr, legs.tof_days, LAMBERT_REVOLUTIONS
+        ),
+        **labels,
+    }
+
+
+def _margin_labels(
+    draw: Draw, protocol: Protocol, chosen: NDArray[np.bool_], log_ratio: NDArray[np.float64]
+) -> dict[str, Any]:
+    heaviest = solve_max_initial_mass(draw.legs, method=protocol.solver)
+    m_star = np.where(heaviest.converged, heaviest.m0, np.nan)
+    legs, redrawn = _at_boundary(draw, m_star, chosen, log_ratio)
+    log_margin = np.log(m_star / legs.m0)
+    flyable = log_margin >= 0.0
+    status = np.where(heaviest.converged, Status.TOO_HEAVY, Status.NOT_CONVERGED).astype(np.int8)
+    status[flyable] = Status.CONVERGED
+    m_final = np.full(len(legs), np.nan)
+    seconds = heaviest.seconds.copy()
+    if protocol.propellant:
+        rows = np.flatnonzero(flyable)
+        best = optimise(legs.take(rows), method=protocol.solver, guess=heaviest.take(rows))
+        status[rows] = best.status
+        m_final[rows] = np.where(best.converged, best.m_final, np.nan)
+        seconds[rows] += best.seconds
+    return {
+        "legs": legs,
+        "m_star_kg": m_star,
+        "log_margin": log_margin,
+        "m_final_kg": m_final,
+        "status": status,
+        "start": heaviest.start,
+        "seconds": seconds,
+        "boundary_draw": redrawn,
+    }
+
+
+def _at_boundary(
+    draw: Draw,
+    m_star: NDArray[np.float64],
+    chosen: NDArray[np.bool_],
+    log_ratio: NDArray[np.float64],
+) -> tuple[Legs, NDArray[np.bool_]]:
+    """Return the legs with the chosen masses drawn again near m*, and which these are.
+
+    A mass that would leave the protocol's range keeps its first draw. Where
+    the range reaches below a row's dry mass (drawn spacecraft), the dry mass
+    keeps its ratio to the initial mass.
+    """
+    legs = draw.legs
+    near = m_star * np.exp(log_ratio)
+    redrawn = chosen & (near >= draw.m0_min) & (near <= draw.m0_max)
+    m0 = np.where(redrawn, near, legs.m0)
+    m_dry = np.where(m0 < legs.m_dry, legs.m_dry / legs.m0 * m0, legs.m_dry)
+    moved = Legs(
+        rv_dep=legs.rv_dep,
+        rv_arr=legs.rv_arr,
+        tof_days=legs.tof_days,
+        m0=m0,
+        thrust=legs.thrust,
+        isp=legs.isp,
+        m_dry=m_dry,
+        t_dep_mjd2000=legs.t_dep_mjd2000,
+        dep_id=legs.dep_id,
+        arr_id=legs.arr_id,
+    )
+    return moved, redrawn
+
+
+def _convergence_labels(draw: Draw, solver: str, rng: np.random.Generator) -> dict[str, Any]:
+    """Label by one random start; m* is found too, to tell what luck adds to physics."""
+    legs = draw.legs
+    found = converge_from_random_start(legs, rng)
+    heaviest = solve_max_initial_mass(legs, method=solver)
+    m_star = np.where(heaviest.converged, heaviest.m0, np.nan)
+    return {
+        "legs": legs,
+        "m_star_kg": m_star,
+        "log_margin": np.log(m_star / legs.m0),
+        "m_final_kg": np.where(found.converged, found.m_final, np.nan),
+        "status": found.status,
+        "start": found.start,
+        "seconds": found.seconds,
+        "boundary_draw": np.zeros(len(legs), dtype=np.bool_),
+    }
+
+
+def _leg_columns(legs: Legs, task: ShardTask) -> Columns:
+    assert legs.dep_id is not None
+    assert legs.arr_id is not None
+    assert legs.t_dep_mjd2000 is not None
+    # Drawn orbits get ids of their own, so that splits by pair keep them apart.
+    row = task.shard * task.protocol.legs_per_shard + np.arange(len(legs), dtype=np.int64)
+    columns = {
+        "dep_id": np.where(legs.dep_id == -1, -2 * row - 1, legs.dep_id),
+        "arr_id": np.where(legs.arr_id == -1, -2 * row - 2, legs.arr_id),
+        "t_dep_mjd2000": legs.t_dep_mjd2000,
+        "tof_days": legs.tof_days,
+        "m0_kg": legs.m0,
+        "thrust_n": legs.thrust,
+        "isp_s": legs.isp,
+        "m_dry_kg": legs.m_dry,
+    }
+    for state, names in ((legs.rv_dep, DEPARTURE_STATE), (legs.rv_arr, ARRIVAL_STATE)):
+        columns |= {column.name: state[:, k] for k, column in enumerate(names)}
+    return columns

@@ -1,0 +1,201 @@
+"""`Protocol`: what a protocol's TOML file may say, and how it is read."""
+
+from importlib import resources
+from pathlib import Path
+from typing import Annotated, Any, Literal, final
+
+import msgspec
+from msgspec import Meta
+
+from feasibility.dataset.any_spacecraft import AnySpacecraft
+from feasibility.dataset.impulsive import ImpulsiveGrid
+from feasibility.dataset.random_pairs import RandomPairs
+from feasibility.dataset.search_candidates import SearchCandidates
+from feasibility.errors import InputError
+from feasibility.legs import Spacecraft
+
+Sampler = RandomPairs | SearchCandidates | AnySpacecraft
+"""The samplers; a TOML file chooses by ``kind`` in its table ``[sampler]``."""
+
+
+class _Table(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A TOML table in which every key is known."""
+
+
+@final
+class SpacecraftTable(_Table, frozen=True, kw_only=True):
+    """Table ``[spacecraft]``."""
+
+    dry_mass_kg: Annotated[float, Meta(ge=0)]
+    thrust_n: Annotated[float, Meta(gt=0)]
+    isp_s: Annotated[float, Meta(gt=0)]
+
+
+@final
+class CatalogueTable(_Table, frozen=True, kw_only=True):
+    """Table ``[catalogue]``: a file, or else a synthetic main belt."""
+
+    file: str | None = None
+    synthetic_bodies: Annotated[int, Meta(ge=2)] = 16256
+    synthetic_seed: Annotated[int, Meta(ge=0)] = 0
+
+
+@final
+class Protocol(_Table, frozen=True, kw_only=True):
+    """How the legs of a dataset are drawn and labelled.
+
+    Parameters
+    ----------
+    name, description : str
+        For people.
+    sampler : RandomPairs, SearchCandidates or AnySpacecraft
+        What draws the legs.
+    spacecraft : SpacecraftTable, optional
+        The one spacecraft; needed by all samplers but "any-spacecraft", which draws its own.
+    catalogue : CatalogueTable
+        The bodies.
+    impulsive_grid : ImpulsiveGrid
+        Grid of dt_imp.
+    label : "margin" or "convergence"
+        What makes a leg feasible: initial mass up to m*, or, as in the paper,
+        that the minimum-propellant problem converged from one random start.
+    solver : "fast" or "reference"
+        Leg solver of m*, and of the minimum propellant.
+    propellant : bool
+        Whether the minimum-propellant problem is solved where the leg is flyable
+        (margin label only).
+    boundary_share : float
+        Share of rows whose initial mass is drawn again, near m*, after solving.
+    boundary_sigma : float
+        Standard deviation of log(m0 / m*) of those rows.
+    legs_per_shard : int
+        Rows of one Parquet file: the unit of work and of random numbers.
+    """
+
+    name: str
+    description: str = ""
+    label: Literal["margin", "convergence"] = "margin"
+    solver: Literal["fast", "reference"] = "fast"
+    propellant: bool = True
+    boundary_share: Annotated[float, Meta(ge=0, le=1)] = 0.0
+    boundary_sigma: Annotated[float, Meta(gt=0)] = 0.05
+    legs_per_shard: Annotated[int, Meta(ge=1)] = 2000
+    sampler: Sampler
+    spacecraft: SpacecraftTable | None = None
+    catalogue: CatalogueTable = msgspec.field(default_factory=CatalogueTable)
+    impulsive_grid: ImpulsiveGrid = msgspec.field(default_factory=ImpulsiveGrid)
+
+    def __post_init__(self) -> None:
+        draws_spacecraft = isinstance(self.sampler, AnySpacecraft)
+        if draws_spacecraft and self.spacecraft is not None:
+            raise ValueError(
+                'the sampler "any-spacecraft" draws its own; expected no [spacecraft]'
+            )
+        if isinstance(self.sampler, AnySpacecraft):
+            return
+        if self.spacecraft is None:
+            raise ValueError("no table [spacecraft], which this sampler needs")
+        if self.sampler.m0_kg[0] < self.spacecraft.dry_mass_kg:
+            raise ValueError(
+                f"sampler m0_kg begins at {self.sampler.m0_kg[0]:g}, below "
+                f"dry_mass_kg = {self.spacecraft.dry_mass_kg:g}"
+            )
+
+    def craft(self) -> Spacecraft | None:
+        """Return the one spacecraft, None where each leg has its own."""
+        table = self.spacecraft
+        if table is None:
+            return None
+        return Spacecraft(m_dry=table.dry_mass_kg, thrust=table.thrust_n, isp=table.isp_s)
+
+    def with_catalogue(self, file: str) -> "Protocol":
+        """Return the protocol with another catalogue file."""
+        return msgspec.structs.replace(self, catalogue=CatalogueTable(file=file))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return every setting as plain data, as JSON and TOML have it."""
+        plain: dict[str, Any] = msgspec.to_builtins(self)
+        return plain
+
+
+def builtin_protocols() -> dict[str, str]:
+    """Return the names of the built-in protocols and their TOML texts."""
+    folder = resources.files("feasibility") / "protocols"
+    return {
+        entry.name.removesuffix(".toml"): entry.read_text(encoding="utf-8")
+        for entry in sorted(folder.iterdir(), key=lambda entry: entry.name)
+        if entry.name.endswith(".toml")
+    }
+
+
+def read_protocol(protocol: str) -> Protocol:
+    """Read a protocol by name or from a TOML file.
+
+    Parameters
+    ----------
+    protocol : str
+        Name of a built-in protocol, or path of a TOML file.
+
+    Raises
+    ------
+    InputError
+        No such protocol, unreadable file, TOML that does not parse, an unknown
+        key, or a value of the wrong type or range; the message names file and key.
+    """
+    builtin = builtin_protocols()
+    if protocol in builtin:
+        return _decode(builtin[protocol], f"built-in protocol {protocol}")
+    path = Path(protocol)
+    if not path.exists():
+        raise InputError(
+            f"{protocol}: no such protocol or file; built-in protocols are {', '.join(builtin)}"
+        )
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: cannot be read as a TOML file ({error})") from None
+    read = _decode(text, str(path))
+    file = read.catalogue.file
+    if file is not None and not Path(file).is_absolute():
+        # A path inside a file is meant relative to that file.
+        return read.with_catalogue(str(path.parent / file))
+    return read
+
+
+def _decode(text: str, label: str) -> Protocol:
+    try:
+        return msgspec.toml.decode(text, type=Protocol, strict=False)
+    except msgspec.ValidationError as error:
+        raise InputError(f"{label}: {_readable(str(error), text)}") from None
+    except msgspec.DecodeError as error:
+        raise InputError(f"{label}: not valid TOML ({error})") from None
+
+
+def _readable(message: str, toml: str) -> str:
+    """Rewrite msgspec's ``... - at `$.sampler` `` in the words of a TOML file."""
+    text, _, where = message.partition(" - at `$")
+    where = where.rstrip("`").lstrip(".")
+    if text.startswith("Object contains unknown field"):
+        key = text.split("`")[1]
+        known = ", ".join(_known_keys(where, toml))
+        place = f"in [{where}]" if where else "at top level"
+        return f"unknown key {key!r} {place}; known keys are {known}"
+    text = text[0].lower() + text[1:]
+    return f"{text} (at {where})" if where else text
+
+
+def _known_keys(where: str, toml: str) -> list[str]:
+    tables: dict[str, Any] = {
+        "": Protocol,
+        "spacecraft": SpacecraftTable,
+        "catalogue": CatalogueTable,
+        "impulsive_grid": ImpulsiveGrid,
+    }
+    keys = []
+    if where == "sampler":
+        kind = msgspec.toml.decode(toml)["sampler"]["kind"]
+        for sampler in (RandomPairs, SearchCandidates, AnySpacecraft):
+            if sampler.__struct_config__.tag == kind:
+                tables["sampler"] = sampler
+                keys.append("kind")
+    return keys + [field.name for field in msgspec.structs.fields(tables[where])]
