@@ -12,6 +12,9 @@ from numpy.typing import NDArray
 
 Vector = NDArray[np.float64]
 
+# The lower bound matters: the backward half divides by the mass after the impulse, so the model
+# has legs that end with next to no mass and accelerate without limit. At 1e-5 that loophole
+# doubled some m*; bounds that close it altogether left other legs of little final mass unsolved.
 _MASS_BOUNDS: Final = (1e-3, 1e3)
 _LEAST_THROTTLE: Final = 1e-10
 

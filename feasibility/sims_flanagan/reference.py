@@ -20,7 +20,13 @@ from feasibility.sims_flanagan.solutions import (
     LegSolutions,
     Status,
 )
-from feasibility.sims_flanagan.starts import FIRST_RANDOM, reference_starts
+from feasibility.sims_flanagan.starts import (
+    FIRST_HOP,
+    FIRST_RANDOM,
+    N_HOPS,
+    bends,
+    reference_starts,
+)
 
 _MASS_ROUNDING = 1e-6
 _SAME_MASS = 1e-3
@@ -43,15 +49,16 @@ def reference_max_initial_mass(
     n_segments: int = N_SEGMENTS,
     rng: np.random.Generator | None = None,
     n_random: int = 0,
-    agreement: int = 5,
+    agreement: int = 8,
 ) -> LegSolutions:
     """Find the maximum initial mass m* of each leg: the best of several starts of IPOPT.
 
     The starts are every Lambert branch up to 2 revolutions, thrust along and
     against the velocity in several sizes, and smoothly wandering thrust
     (`starts.reference_starts`); they stop when `agreement` of them have led to
-    the best mass, so that a leg with one optimum costs little and a leg with
-    many gets all. Neither the legs' `m0` nor `m_dry` plays a part.
+    the best mass, so that a leg with one optimum costs little. A leg with many
+    gets them all and is then solved again from its best solution, disturbed.
+    Neither the legs' `m0` nor `m_dry` plays a part.
 
     Parameters
     ----------
@@ -72,7 +79,7 @@ def reference_max_initial_mass(
     LegSolutions
         n rows; `start` is an index of `starts`: 0 to 4 are Lambert branches (0
         revolutions, then low and high path of 1 and 2), then the tangential, the
-        wandering and the random starts.
+        wandering, the disturbed and the random ones.
 
     Raises
     ------
@@ -95,14 +102,34 @@ def reference_max_initial_mass(
         for start, impulses in reference_starts(leg, n_random, rng):
             if start < FIRST_RANDOM and _agreed(masses, agreement):
                 continue
-            found = _maximise_mass(legs, row, impulses)
-            if found is None:
-                continue
-            masses.append(found.m0)
-            if found.m0 > solutions.m0[row]:
-                _put(solutions, row, found, start)
+            _keep_best(solutions, row, _maximise_mass(legs, row, impulses), start, masses)
+        if masses and not _agreed(masses, agreement):
+            _hop(legs, row, solutions, masses)
         solutions.seconds[row] = time.process_time() - began
     return solutions
+
+
+def _hop(legs: Legs, row: int, solutions: LegSolutions, masses: list[float]) -> None:
+    """Solve again from the best solution so far, at first as it is and then disturbed.
+
+    A leg whose starts do not agree has many optima, and better ones lie near good ones.
+    """
+    for number, bend in enumerate(bends(solutions.n_segments, N_HOPS)):
+        throttles = solutions.throttles[row] + bend
+        throttles /= np.maximum(1.0, np.linalg.norm(throttles, axis=1, keepdims=True))
+        final = float(solutions.m_final[row] / solutions.m0[row])
+        found = _solve_maximum(legs, row, throttles, float(solutions.m0[row]), final)
+        _keep_best(solutions, row, found, FIRST_HOP + number, masses)
+
+
+def _keep_best(
+    solutions: LegSolutions, row: int, found: _Closed | None, start: int, masses: list[float]
+) -> None:
+    if found is None:
+        return
+    masses.append(found.m0)
+    if found.m0 > solutions.m0[row]:
+        _put(solutions, row, found, start)
 
 
 def _maximise_mass(legs: Legs, row: int, impulses: NDArray[np.float64]) -> _Closed | None:
@@ -115,7 +142,14 @@ def _maximise_mass(legs: Legs, row: int, impulses: NDArray[np.float64]) -> _Clos
     mass_unit = float(legs.m0[row] * leg.max_thrust * leg.tof / n_segments / pushes.mean())
     throttles = impulses * (masses / pushes.mean())[:, None]
     throttles /= np.maximum(1.0, np.linalg.norm(throttles, axis=1, keepdims=True))
-    leg = scaled_leg(legs, row, mass_unit, n_segments)
+    return _solve_maximum(legs, row, throttles, mass_unit, final)
+
+
+def _solve_maximum(
+    legs: Legs, row: int, throttles: NDArray[np.float64], mass_unit: float, final: float
+) -> _Closed | None:
+    """Run IPOPT from throttles, an initial mass of one unit and a final one of `final` units."""
+    leg = scaled_leg(legs, row, mass_unit, len(throttles))
     guess = np.concatenate([throttles.ravel(), [1.0, final]])
     x = _evolve(MaximumMassProblem(leg), guess, _ipopt())
     return _confirmed(legs, row, x[:-2], float(x[-2]) * mass_unit, float(x[-1]) * mass_unit)

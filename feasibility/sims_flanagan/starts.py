@@ -36,7 +36,13 @@ _BASE_SIZE = 0.2
 FIRST_WANDERING: Final = N_LAMBERT + 2 * len(_SIZES) + 2 * len(_TURN_SIZES)
 """Index of the first wandering start; between it and the Lambert branches the tangential ones."""
 
-FIRST_RANDOM: Final = FIRST_WANDERING + N_WANDERING
+N_HOPS: Final = 10
+"""Number of solves from the best solution, for legs whose starts do not agree."""
+
+FIRST_HOP: Final = FIRST_WANDERING + N_WANDERING
+"""Index of the first of these."""
+
+FIRST_RANDOM: Final = FIRST_HOP + N_HOPS
 """Index of the first random start."""
 
 _KNOTS = 4
@@ -111,13 +117,38 @@ def _wandering(
     leg: Any, n_starts: int, rng: np.random.Generator, first_index: int
 ) -> Iterator[Start]:
     """Yield impulses whose direction wanders smoothly from knot to knot, in two sizes."""
-    at = np.linspace(0.0, _KNOTS - 1.0, leg.nseg)
     for number in range(n_starts):
-        knots = rng.normal(size=(3, _KNOTS))
-        path = np.stack([np.interp(at, np.arange(_KNOTS), axis) for axis in knots], axis=1)
+        path = _smooth_path(leg.nseg, rng)
         norms = np.maximum(np.linalg.norm(path, axis=1, keepdims=True), 1e-9)
         size = 1.0 if number % 2 else 3.0
         yield first_index + number, size * _impulse(leg) * path / norms
+
+
+def bends(n_segments: int, n: int) -> Iterator[NDArray[np.float64]]:
+    """Yield what is added to the throttles of a solution to leave its optimum.
+
+    Parameters
+    ----------
+    n_segments : int
+        Number of segments, s.
+    n : int
+        How many.
+
+    Yields
+    ------
+    (s, 3) float64
+        First zeros, for a solver that stopped early, then smooth disturbances of
+        the size of the throttles; the same for every leg.
+    """
+    rng = np.random.default_rng(0)
+    for number in range(n):
+        yield _smooth_path(n_segments, rng) if number else np.zeros((n_segments, 3))
+
+
+def _smooth_path(n_segments: int, rng: np.random.Generator) -> NDArray[np.float64]:
+    at = np.linspace(0.0, _KNOTS - 1.0, n_segments)
+    knots = rng.normal(size=(3, _KNOTS))
+    return np.stack([np.interp(at, np.arange(_KNOTS), axis) for axis in knots], axis=1)
 
 
 def _impulse(leg: Any) -> float:
