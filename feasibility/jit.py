@@ -1,13 +1,20 @@
-"""Compilation of the numeric kernels: one decorator, one announcement.
+"""Compilation of the numeric kernels: one decorator, one cache, one announcement.
 
 Kernels are compiled on first use and cached on disk beside their source (or in
 numba's user cache where that folder is read-only), so worker processes and
 later runs load them in milliseconds. The first compilation in a process that
 finds no cache is announced on stderr, because it takes seconds.
+
+Numba looks only at a kernel's own file to see whether its cache is stale, but a
+compiled kernel contains the kernels that it calls. Here every kernel's cache
+also depends on the text of all kernel files of this package.
 """
 
+import functools
+import hashlib
 import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
@@ -21,8 +28,22 @@ def kernel(function: _F) -> _F:
 
     The kernel works on bare arrays and numbers; it validates nothing.
     """
-    compiled: _F = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
-    return compiled
+    compiled = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
+    # Private names of numba, so absence must do no harm; test_kernel_cache would tell.
+    index = getattr(getattr(compiled, "_cache", None), "_cache_file", None)
+    if hasattr(index, "_source_stamp"):
+        index._source_stamp = (index._source_stamp, _kernel_sources_digest())
+    typed: _F = compiled
+    return typed
+
+
+@functools.cache
+def _kernel_sources_digest() -> str:
+    """Return a digest of the text of all kernel files."""
+    digest = hashlib.sha256()
+    for path in sorted(Path(__file__).parent.rglob("*kernels.py")):
+        digest.update(path.read_bytes())
+    return digest.hexdigest()
 
 
 class _Announcer(event.Listener):  # type: ignore[misc]

@@ -1,9 +1,13 @@
 """Compiled kernels are announced once, cached on disk and shared by processes."""
 
 import os
+import shutil
 import subprocess
 import sys
 import time
+from pathlib import Path
+
+import feasibility
 
 PROGRAM = """
 import numpy as np
@@ -17,6 +21,12 @@ propagate_stm_batch(state, np.ones(1), 1.0)
 lambert(state[:, :3], other[:, :3], [1.5], 1, 1.0)
 mima(state, other, 1.5, 1.0, 1.0, mu=1.0)
 mima2(state, other, 1.5, 1.0, 1.0, mu=1.0)
+"""
+
+CHEAP_PROGRAM = """
+import numpy as np
+from feasibility.orbits.kepler_kernels import propagate_batch
+propagate_batch(np.array([[1.0, 0, 0, 0, 1.0, 0]]), np.ones(1), 1.0)
 """
 
 
@@ -37,3 +47,23 @@ def test_second_process_compiles_nothing(tmp_path):
     assert errors[0].count("compiling numeric kernels") == 1
     assert errors[1] == ""
     assert seconds[1] < seconds[0] < 60
+
+
+def test_a_changed_kernel_file_invalidates_the_kernels_of_all_files(tmp_path):
+    package = tmp_path / "feasibility"
+    shutil.copytree(
+        Path(feasibility.__file__).parent, package, ignore=shutil.ignore_patterns("__pycache__")
+    )
+    environment = os.environ | {"PYTHONPATH": str(tmp_path)}
+    environment.pop("NUMBA_CACHE_DIR", None)
+
+    def errors():
+        command = [sys.executable, "-c", CHEAP_PROGRAM]
+        done = subprocess.run(command, env=environment, check=True, capture_output=True, text=True)
+        return done.stderr
+
+    assert "compiling" in errors()
+    assert errors() == ""
+    other = package / "orbits" / "mima_kernels.py"
+    other.write_text(other.read_text() + "\n# changed\n")
+    assert "compiling" in errors()
