@@ -59,7 +59,9 @@ def test_a_changed_kernel_file_invalidates_the_kernels_of_all_files(tmp_path):
 
     def errors():
         command = [sys.executable, "-c", CHEAP_PROGRAM]
-        done = subprocess.run(command, env=environment, check=True, capture_output=True, text=True)
+        done = subprocess.run(
+            command, env=environment, cwd=tmp_path, check=True, capture_output=True, text=True
+        )
         return done.stderr
 
     assert "compiling" in errors()
