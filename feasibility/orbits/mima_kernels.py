@@ -184,13 +184,19 @@ def mima2_acceleration(
     x2, f2 = 0.0, 1.0
     _, x = mima_acceleration(dv1, dv2, tof)
     t = 1.0 - min(max(x, 0.1), 0.9)
+    f = np.nan
     mean = np.nan
     for _ in range(_MAX_EVALUATIONS):
         x = x1 + t * (x2 - x1)
         a1, a2 = _accelerations(x, rv, tof, mu, rhs, end, scratch)
+        f_before, mean_before = f, mean
         f = (a1 - a2) / (a1 + a2)
         mean = 0.5 * (a1 + a2)
         if not (abs(f) > _TOLERANCE):
+            break
+        if abs(f * f_before) < _TOLERANCE:
+            # A secant step from here errs by the product of the two: evaluating it is not needed.
+            mean += (mean - mean_before) * f / (f_before - f)
             break
         if (f > 0.0) == (f1 > 0.0):
             x3, f3 = x1, f1
