@@ -10,6 +10,7 @@ _DISTRIBUTIONS: Final = {
     "sklearn": "scikit-learn",
     "imblearn": "imbalanced-learn",
     "optuna": "optuna",
+    "threadpoolctl": "threadpoolctl",
 }
 
 

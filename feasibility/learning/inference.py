@@ -139,9 +139,10 @@ class NeighboursPredictor:
     def __call__(self, X: _Array, /) -> _Array:
         """Return (n,) probabilities."""
         distance, rows = self._tree.query(X, k=range(1, self._neighbours + 1))
-        votes = self._label[rows]
+        votes: _Array = self._label[rows]
         if self._weighting == "uniform":
-            return votes.mean(axis=1)
+            mean: _Array = votes.mean(axis=1)
+            return mean
         # Rows at distance zero outvote all others.
         same = distance == 0.0
         with np.errstate(divide="ignore"):

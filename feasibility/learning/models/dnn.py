@@ -52,10 +52,10 @@ class DnnConfig:
     epochs : int
         How many at most; by default the rate has then fallen three times for DNN1.
     patience : int, optional
-        Stop when the validation loss has not fallen for so many epochs.
+        Stop early, when the validation loss has not fallen for so many epochs.
     keep_best : bool
-        Keep the weights of the epoch with the lowest validation loss, where there are
-        validation rows, instead of the last ones.
+        Keep the weights of the lowest validation loss instead of the last ones. With neither,
+        as in the paper, validation rows are only reported on.
     device : str
         "cpu", "cuda", or "auto" for a GPU where there is one.
     threads : int
@@ -73,7 +73,7 @@ class DnnConfig:
     drop_factor: float = 0.1720
     epochs: int = 24
     patience: int | None = None
-    keep_best: bool = True
+    keep_best: bool = False
     device: str = "cpu"
     threads: int = 2
 
@@ -133,8 +133,11 @@ class Dnn(Fitted):
             Also: the checkpoint belongs to another training.
         """
         check_training_data(X, y)
-        torch = load_extra("torch")
         config = self._config
+        judged = config.patience is not None or config.keep_best
+        if judged and (y_val is None or not len(y_val)):
+            raise InputError("dnn patience, keep_best: they need validation rows, got none")
+        torch = load_extra("torch")
         torch.set_num_threads(config.threads)
         device = _device(torch, config.device)
         seed = int(rng.integers(2**31))
@@ -193,7 +196,7 @@ class Dnn(Fitted):
                 val_accuracy,
                 time.perf_counter() - began,
             )
-            state.record(epoch, keep_best=validation is not None and config.keep_best)
+            state.record(epoch, keep_best=config.keep_best)
             if checkpoint is not None:
                 state.save(torch, checkpoint)
             if on_epoch is not None:

@@ -25,7 +25,9 @@ class TrainingState:
     epoch : int
         The last one done, 0 before the first.
     best_epoch : int
-        The one whose weights are kept.
+        The one with the lowest validation loss, 0 without validation.
+    best_weights : dict
+        Weights to keep, of that epoch or of the last one.
     """
 
     def __init__(self, network: Any, optimiser: Any, identity: str) -> None:
@@ -40,11 +42,12 @@ class TrainingState:
     def record(self, epoch: Epoch, *, keep_best: bool) -> None:
         """Take note of an epoch: the best so far, or simply the last one."""
         self.epoch = epoch.number
-        if keep_best and not epoch.validation_loss < self.best_loss:
-            return
-        self.best_epoch = epoch.number
-        self.best_loss = epoch.validation_loss
-        self.best_weights = _copy(self.network)
+        better = epoch.validation_loss < self.best_loss
+        if better:
+            self.best_epoch = epoch.number
+            self.best_loss = epoch.validation_loss
+        if better or not keep_best:
+            self.best_weights = _copy(self.network)
 
     def save(self, torch: Any, path: Path) -> None:
         """Write everything to a file, which is complete or absent."""

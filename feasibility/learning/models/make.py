@@ -57,7 +57,7 @@ def make_model(name: str, **hyperparameters: Any) -> Model:
     Parameters
     ----------
     name : str
-        One of `KINDS`.
+        One of `KINDS`, or of `PRESETS` for a network with its hyperparameters.
     **hyperparameters
         Fields of the model's configuration class; those not given have its defaults.
 
@@ -66,8 +66,11 @@ def make_model(name: str, **hyperparameters: Any) -> Model:
     InputError
         Unknown name or hyperparameter, or a value that cannot be used.
     """
+    if name in PRESETS:
+        return make_model("dnn", **{**PRESETS[name][0], **hyperparameters})
     if name not in _HOMES:
-        raise InputError(f"model {name!r}: unknown, expected one of {', '.join(KINDS)}")
+        known = ", ".join([*KINDS, *PRESETS])
+        raise InputError(f"model {name!r}: unknown, expected one of {known}")
     home, cls = _HOMES[name]
     try:
         model: Model = getattr(importlib.import_module(home), cls)(**hyperparameters)
