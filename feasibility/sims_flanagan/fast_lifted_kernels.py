@@ -6,6 +6,7 @@ import numpy as np
 
 from feasibility.jit import kernel
 from feasibility.sims_flanagan.fast_algebra_kernels import (
+    cholesky,
     divide,
     multiply_lower_transposed,
     solve_lower,
@@ -19,13 +20,19 @@ from feasibility.sims_flanagan.fast_element_kernels import (
     wrap,
 )
 from feasibility.sims_flanagan.fast_workspace_kernels import (
+    D_DV,
+    D_MOVED,
+    D_NODES,
+    D_RESIDUAL,
     GAP,
     JUMPS,
     LINEAR,
     LOWER,
     M_ONE,
     M_TWO,
+    MEMORY,
     MOVED,
+    MOVED_BEFORE,
     PREVIOUS,
     RESIDUAL,
     TOTAL,
@@ -71,13 +78,13 @@ def draw_path(e0, e1, tof, turns, n, shape, nodes):
 
 
 @kernel
-def lifted_sweep(e0, e1, longitude, dt, n, n_forward, c, first, relax, nodes, dv, z, lam, w):
+def lifted_sweep(e0, e1, longitude, dt, n, n_forward, c, first, nodes, dv, z, lam, w):
     """Bend a path of nodes and its impulses towards a true arc of least thrust.
 
     One lifted Newton step: every node is an unknown of its own, condensed to the
     impulses; in elements the coasts between nodes are exactly linear. Returns the
-    new z, -1 where the step fails, and the largest move of a node, inf where the step
-    had to be shortened.
+    new z, -1 where the step fails, and the relative change of the impulses; leaves the
+    full step in w.n3[RESIDUAL] and w.n6[MOVED], for `advance` to take.
     """
     jumps, moved = w.n6[JUMPS], w.n6[MOVED]
     b, response = w.b[0], w.b[1]
@@ -162,7 +169,7 @@ def lifted_sweep(e0, e1, longitude, dt, n, n_forward, c, first, relax, nodes, dv
     solve_lower_transposed(w.m[LOWER], lam)
     if not z > 0.0:
         return -1.0, np.inf
-    # How the nodes move; half steps where an orbit would open.
+    # How the nodes move with the impulses.
     for j in range(6):
         work[j] = moved[0, j]
     change = 0.0
@@ -183,44 +190,100 @@ def lifted_sweep(e0, e1, longitude, dt, n, n_forward, c, first, relax, nodes, dv
             residual[i, k] = linear[i, k] - dv[i, k]
             change += abs(residual[i, k])
             size += abs(linear[i, k])
-    fraction = relax
-    for _ in range(6):
-        inside = True
-        for i in range(n):
-            ex = nodes[i, 1] + fraction * moved[i, 1]
-            ey = nodes[i, 2] + fraction * moved[i, 2]
-            motion = nodes[i, 0] + fraction * moved[i, 0]
-            if not (ex * ex + ey * ey < 0.9 and 0.1 * e0[0] < motion < 10.0 * e0[0]):
-                inside = False
-        if inside:
-            break
-        fraction *= 0.5
-    if not inside:
-        return -1.0, np.inf
-    for i in range(n):
-        for j in range(6):
-            nodes[i, j] += fraction * moved[i, j]
-        for j in range(3):
-            dv[i, j] += fraction * (linear[i, j] - dv[i, j])
     return z, change / size
 
 
 @kernel
-def next_relaxation(relax, n, sweep, w):
-    """Return the fraction of the next lifted step by Aitken's rule for vectors.
+def advance(nodes, dv, n, relax, count, w):
+    """Move nodes and impulses by Anderson's rule; return the number of steps remembered.
 
-    Full steps overshoot where the dynamics bend more than the thrust bound does.
-    Irons and Tuck 1969, "A version of the Aitken accelerator for computer iteration".
+    A plain lifted step overshoots, and with it oscillates, where the dynamics bend
+    more than the thrust bound does. Anderson 1965 ("Iterative procedures for
+    nonlinear integral equations") combines the last few steps, here up to six, so
+    that the predicted change of the impulses is least. `count` is the number of
+    steps remembered so far; 0 takes a plain step. Where an orbit would open, the
+    memory is dropped and the plain step halved.
     """
-    residual, previous = w.n3[RESIDUAL], w.n3[PREVIOUS]
-    product = 0.0
-    square = 0.0
+    moved, residual, previous = w.n6[MOVED], w.n3[RESIDUAL], w.n3[PREVIOUS]
+    gram, lower, gamma = w.m[M_ONE], w.m[M_TWO], w.v[WORK]
+    if count > 0:
+        slot = (count - 1) % MEMORY
+        for i in range(n):
+            for k in range(3):
+                w.n3[D_RESIDUAL + slot, i, k] = residual[i, k] - previous[i, k]
+            for k in range(6):
+                w.n6[D_MOVED + slot, i, k] = moved[i, k] - w.n6[MOVED_BEFORE, i, k]
+    used = min(count, MEMORY)
+    for a in range(6):
+        gamma[a] = 0.0
+        for b in range(6):
+            gram[a, b] = 1.0 if a == b else 0.0
+    trace = 0.0
+    for a in range(used):
+        for b in range(a + 1):
+            total = 0.0
+            for i in range(n):
+                for k in range(3):
+                    total += w.n3[D_RESIDUAL + a, i, k] * w.n3[D_RESIDUAL + b, i, k]
+            gram[a, b] = total
+        trace += gram[a, a]
+        for i in range(n):
+            for k in range(3):
+                gamma[a] += w.n3[D_RESIDUAL + a, i, k] * residual[i, k]
+    for a in range(used):
+        gram[a, a] += 1e-8 * trace
+    if cholesky(gram, lower):
+        solve_lower(lower, gamma)
+        solve_lower_transposed(lower, gamma)
+    else:
+        used = 0
     for i in range(n):
         for k in range(3):
-            difference = residual[i, k] - previous[i, k]
-            product += difference * previous[i, k]
-            square += difference * difference
             previous[i, k] = residual[i, k]
-    if sweep == 0 or not square > 0.0:
-        return relax
-    return min(max(-relax * product / square, 0.15), 1.0)
+            step = relax * residual[i, k]
+            for a in range(used):
+                step -= gamma[a] * (w.n3[D_DV + a, i, k] + relax * w.n3[D_RESIDUAL + a, i, k])
+            residual[i, k] = step
+        for k in range(6):
+            w.n6[MOVED_BEFORE, i, k] = moved[i, k]
+            step = relax * moved[i, k]
+            for a in range(used):
+                step -= gamma[a] * (w.n6[D_NODES + a, i, k] + relax * w.n6[D_MOVED + a, i, k])
+            moved[i, k] = step
+    if not inside(nodes, moved, 1.0, n):
+        count = 0
+        for i in range(n):
+            for k in range(3):
+                residual[i, k] = previous[i, k]
+            for k in range(6):
+                moved[i, k] = w.n6[MOVED_BEFORE, i, k]
+    fraction = 1.0
+    for _ in range(8):
+        if inside(nodes, moved, fraction, n):
+            break
+        fraction *= 0.5
+    else:
+        return -1
+    slot = count % MEMORY
+    for i in range(n):
+        for k in range(3):
+            step = fraction * residual[i, k]
+            w.n3[D_DV + slot, i, k] = step
+            dv[i, k] += step
+        for k in range(6):
+            step = fraction * moved[i, k]
+            w.n6[D_NODES + slot, i, k] = step
+            nodes[i, k] += step
+    return count + 1
+
+
+@kernel
+def inside(nodes, moved, fraction, n):
+    """Tell whether the moved nodes are moderate ellipses."""
+    for i in range(n):
+        ex = nodes[i, 1] + fraction * moved[i, 1]
+        ey = nodes[i, 2] + fraction * moved[i, 2]
+        motion = nodes[i, 0] + fraction * moved[i, 0]
+        if not (ex * ex + ey * ey < 0.9 and 0.05 < motion < 20.0):
+            return False
+    return True

@@ -8,7 +8,7 @@ from feasibility.jit import kernel
 from feasibility.sims_flanagan.fast_arc_kernels import close, improve
 from feasibility.sims_flanagan.fast_dual_kernels import z_of_impulses
 from feasibility.sims_flanagan.fast_element_kernels import to_elements
-from feasibility.sims_flanagan.fast_lifted_kernels import draw_path, lifted_sweep, next_relaxation
+from feasibility.sims_flanagan.fast_lifted_kernels import advance, draw_path, lifted_sweep
 from feasibility.sims_flanagan.fast_workspace_kernels import (
     DV,
     E0,
@@ -26,6 +26,7 @@ _N_TURNS = 5
 _FIRST_SWEEPS = 2
 _SWEEPS = 20
 _SCREEN = 3.0
+_RELAX = 0.5
 _LOST = 1.25
 _HOPELESS = 1.03
 _LIKELY = 1.3
@@ -90,9 +91,9 @@ def begin(s, turns, shape, tof, c, n, w):
     z = -1.0
     for sweep in range(_FIRST_SWEEPS):
         z, _ = lifted_sweep(
-            e0, e1, longitude, tof / n, n, n // 2, c, sweep == 0, 1.0, nodes, dv, z, lam, w
+            e0, e1, longitude, tof / n, n, n // 2, c, sweep == 0, nodes, dv, z, lam, w
         )
-        if not z > 0.0:
+        if not z > 0.0 or advance(nodes, dv, n, 1.0, 0, w) < 0:
             return
         w.v[Z, s] = z
 
@@ -106,16 +107,18 @@ def pursue(s, x0, tof, c, n, best, w):
     dt = tof / n
     n_forward = n // 2
     z = w.v[Z, s]
-    relax = 1.0
+    count = 0
     for sweep in range(_SWEEPS):
         z, move = lifted_sweep(
-            e0, e1, w.v[LONGITUDE, s], dt, n, n_forward, c, False, relax, nodes, start, z, lam, w
+            e0, e1, w.v[LONGITUDE, s], dt, n, n_forward, c, False, nodes, start, z, lam, w
         )
         if not z > 0.0 or move < 3e-3:
             break
         if sweep >= 3 and z > _LOST * best:
             return np.inf
-        relax = next_relaxation(relax, n, sweep, w)
+        count = advance(nodes, start, n, _RELAX, count, w)
+        if count < 0:
+            break
     for i in range(n):
         for j in range(3):
             dv[i, j] = start[i, j]

@@ -14,10 +14,19 @@ from feasibility.jit import kernel
 N_STARTS = 6
 """Paths that can be under way at once: five numbers of turns and one random path."""
 
+MEMORY = 6
+"""Steps that Anderson's rule remembers; at most 6, the size of the matrices at hand."""
+
 # Rows of Workspace.n3: per segment, three components.
-DV, TRIAL, LINEAR, RESIDUAL, PREVIOUS, PRIMER, TRIAL_PRIMER, THRUST, STARTS = range(9)
+DV, TRIAL, LINEAR, RESIDUAL, PREVIOUS, PRIMER, TRIAL_PRIMER, THRUST = range(8)
+D_RESIDUAL = 8
+D_DV = D_RESIDUAL + MEMORY
+STARTS = D_DV + MEMORY
 # Rows of Workspace.n6: per segment, six components.
-JUMPS, MOVED, NODES = range(3)
+JUMPS, MOVED, MOVED_BEFORE = range(3)
+D_MOVED = 3
+D_NODES = D_MOVED + MEMORY
+NODES = D_NODES + MEMORY
 # Rows of Workspace.s: per segment, one number.
 NORM, TRIAL_NORM, Y, SLOPE, PINNED = range(5)
 # Rows of Workspace.m after the n transition matrices, counted from the end.
