@@ -1,0 +1,55 @@
+"""`ClassifierPruner`: a trained classifier with a threshold for a wanted recall."""
+
+from dataclasses import dataclass, field
+from typing import final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.classifier import FeasibilityClassifier
+from feasibility.legs import Legs
+
+
+@final
+@dataclass(frozen=True)
+class ClassifierPruner:
+    """Keeps a leg that is likely enough to be feasible, or that the classifier does not know.
+
+    A leg outside the classifier's domain is kept: nothing is known against it.
+
+    Parameters
+    ----------
+    classifier : FeasibilityClassifier
+        The trained model.
+    recall : float
+        Share of the feasible legs to keep, above 0 and at most 1. The threshold
+        follows from calibration legs that were not trained on, so the share is
+        met on legs like those of the training.
+
+    Attributes
+    ----------
+    threshold : float
+        Least probability of a leg that is kept.
+
+    Raises
+    ------
+    InputError
+        `recall` is out of range.
+    """
+
+    classifier: FeasibilityClassifier
+    recall: float = 0.99
+    threshold: float = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "threshold", self.classifier.threshold(self.recall))
+
+    @property
+    def name(self) -> str:
+        """Name in counters and reports."""
+        return "classifier"
+
+    def keep(self, legs: Legs, /) -> NDArray[np.bool_]:
+        """Return (n,) bool, True where the leg survives."""
+        probability, inside = self.classifier.assess(legs)
+        return (probability >= self.threshold) | ~inside
