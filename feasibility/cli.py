@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
+from feasibility import command_evaluate, command_train
 from feasibility.errors import InputError, MissingDependencyError
 
 _DESCRIPTION: Final = """\
@@ -99,6 +100,8 @@ def _parser() -> argparse.ArgumentParser:
     )
     protocols.add_argument("name", nargs="?", help="print this one as TOML")
     protocols.set_defaults(run=_protocols)
+    command_train.add_parser(commands)
+    command_evaluate.add_parser(commands)
     return parser
 
 

@@ -75,5 +75,6 @@ def make_model(name: str, **hyperparameters: Any) -> Model:
     try:
         model: Model = getattr(importlib.import_module(home), cls)(**hyperparameters)
     except TypeError as error:
-        raise InputError(f"model {name!r}: {error}") from None
+        # Python's own words, less the name of the class: "got an unexpected keyword argument ...".
+        raise InputError(f"model {name!r}: {str(error).partition('() ')[2] or error}") from None
     return model
