@@ -73,7 +73,9 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("--beam-width", type=int, metavar="N", help="nodes kept at each rank")
     run.add_argument("--passes", type=int, metavar="N", help="beams run one after another")
     run.add_argument(
-        "--pruner", metavar="SPEC", help="such as lambert:1.3,mima2:0.97, or none to keep all"
+        "--pruner",
+        metavar="SPEC",
+        help="such as lambert:1.3,mima2:0.97, a trained model as FILE.seqmodel:RECALL, or none",
     )
     run.add_argument("--solver", choices=("fast", "reference"), help="leg solver")
     run.set_defaults(run=_run)

@@ -1,6 +1,7 @@
 """Pruners named in a configuration or on the command line."""
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Final
 
 from feasibility import AllOf, InputError, LambertPruner, Mima2Pruner, MimaPruner, Pruner
@@ -11,6 +12,8 @@ _BY_NAME: Final[dict[str, Callable[..., Pruner]]] = {
     "mima2": Mima2Pruner,
 }
 
+_MODEL_SUFFIX: Final = ".seqmodel"
+
 
 def parse_pruner(spec: str) -> AllOf:
     """Build pruners from a specification.
@@ -20,12 +23,15 @@ def parse_pruner(spec: str) -> AllOf:
     spec : str
         Comma-separated names, each with an optional parameter after a colon:
         ``"lambert:1.3,mima2:0.97"``. ``"none"`` keeps every leg. The parameter
-        is the factor of `LambertPruner` or the margin of the MIMA pruners.
+        is the factor of `LambertPruner` or the margin of the MIMA pruners. A
+        name that ends in ``.seqmodel`` is the file of a trained classifier;
+        its parameter is the recall.
 
     Raises
     ------
     InputError
-        Unknown name, or a parameter that is no positive number.
+        Unknown name, a parameter that is no positive number, or a model that
+        cannot be used.
     """
     if spec.strip() == "none":
         return AllOf()
@@ -33,17 +39,32 @@ def parse_pruner(spec: str) -> AllOf:
 
 
 def _parse_one(part: str, spec: str) -> Pruner:
-    name, colon, parameter = part.partition(":")
-    if name not in _BY_NAME:
+    name, colon, parameter = part.rpartition(":") if ":" in part else (part, "", "")
+    make = _classifier_pruner(name) if name.endswith(_MODEL_SUFFIX) else _BY_NAME.get(name)
+    if make is None:
         raise InputError(
-            f"pruner {spec!r}: unknown pruner {name!r}; known are none, {', '.join(_BY_NAME)}"
+            f"pruner {spec!r}: unknown pruner {name!r}; known are none, {', '.join(_BY_NAME)} "
+            f"and the path of a trained model (*{_MODEL_SUFFIX})"
         )
     if not colon:
-        return _BY_NAME[name]()
+        return make()
     try:
         value = float(parameter)
     except ValueError:
         value = float("nan")
     if not 0 < value < float("inf"):
         raise InputError(f"pruner {spec!r}: {parameter!r} is not a positive number")
-    return _BY_NAME[name](value)
+    return make(value)
+
+
+def _classifier_pruner(path: str) -> Callable[..., Pruner]:
+    # Imported here: a search without a model shall not pay for the classifier's kernels.
+    from feasibility.classifier import FeasibilityClassifier
+    from feasibility.pruners.classifier import ClassifierPruner
+
+    classifier = FeasibilityClassifier.load(Path(path))
+
+    def make(recall: float = 0.99) -> Pruner:
+        return ClassifierPruner(classifier, recall)
+
+    return make
