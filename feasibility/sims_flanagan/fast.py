@@ -1,6 +1,12 @@
-"""Fast batch solver for the maximum initial mass of Sims-Flanagan legs."""
+"""Fast batch solvers for Sims-Flanagan legs: maximum initial mass and minimum propellant.
+
+The method is described in docs/solver.md. Where the reference solver hands one
+leg at a time to a general optimiser, these run a whole batch in compiled kernels;
+both solve the same problem, and every solution is confirmed by pykep's own leg.
+"""
 
 import time
+from typing import Final
 
 import numpy as np
 from numpy.random import Generator
@@ -16,7 +22,11 @@ from feasibility.sims_flanagan.solutions import (
     Status,
 )
 
-RANDOM_PATH_SPREAD = 0.1 / np.array([1.0, 2.0, 3.0])
+# Waves sin(k pi t), k = 1, 2, 3, on the five slow elements of a path; the mean motion
+# in units of the departure orbit's. Large enough to reach other optima, small enough to
+# remain moderate ellipses.
+_SPREAD: Final = 0.2 / np.array([1.0, 2.0, 3.0])
+_N_BENT: Final = 3
 
 
 def fast_max_initial_mass(
@@ -25,54 +35,69 @@ def fast_max_initial_mass(
     n_segments: int = N_SEGMENTS,
     extra_random_starts: int = 0,
     rng: Generator | None = None,
+    fallback: bool = False,
 ) -> LegSolutions:
-    """Return the maximum initial mass of each leg.
+    """Return the maximum initial mass of each leg, by sequential linearisation.
 
     Parameters
     ----------
     legs : Legs
         n legs; their initial and dry masses play no part.
     n_segments : int
-        Number of segments, s.
+        Number of segments, s, two or more.
     extra_random_starts : int
-        Further starts along randomly bent paths.
+        Further starts, along randomly bent paths.
     rng : numpy.random.Generator, optional
         Their randomness; seed 0 unless given.
+    fallback : bool
+        Hand legs that were not solved to `reference_max_initial_mass`.
 
     Returns
     -------
     LegSolutions
-        Every converged row is confirmed by pykep's own leg.
+        n rows. ``start`` is 0 to 4 for the nearest number of turns and 1, -1, 2, -2
+        turns beside it, 5 to 8 for bent paths, 9 for a random one, 100 and above for
+        the reference's starts; ``seconds`` is the batch's time shared out evenly.
     """
     from feasibility.sims_flanagan.fast_maximum_kernels import maximum_batch
 
     n = len(legs)
+    rng = np.random.default_rng(0) if rng is None else rng
+    shapes = _SPREAD * rng.standard_normal((n, extra_random_starts, 5, 3))
     throttles = np.zeros((n, n_segments, 3))
     z = np.full(n, np.inf)
     start = np.full(n, -1, dtype=np.int64)
     ratio = np.zeros(n)
-    rng = np.random.default_rng(0) if rng is None else rng
-    shapes = RANDOM_PATH_SPREAD * rng.standard_normal((n, extra_random_starts, 5, 3))
-    began = time.perf_counter()
+    began = time.thread_time()
     maximum_batch(
-        legs.rv_dep,
-        legs.rv_arr,
+        # Copies are writable, as the one compiled signature wants them.
+        legs.rv_dep.copy(),
+        legs.rv_arr.copy(),
         legs.tof_s,
         legs.exhaust_velocity,
         n_segments,
         MU_SUN,
+        _bent_paths(),
         shapes,
         throttles,
         z,
         start,
         ratio,
     )
-    seconds = np.full(n, (time.perf_counter() - began) / max(n, 1))
+    seconds = np.full(n, (time.thread_time() - began) / max(n, 1))
     m0 = legs.thrust * legs.tof_s / n_segments / (z * legs.exhaust_velocity)
-    return confirmed(legs, throttles, m0, m0 * ratio, start, seconds)
+    solutions = _confirmed(legs, throttles, m0, m0 * ratio, start, seconds)
+    return _with_reference(legs, solutions, n_segments) if fallback else solutions
 
 
-def confirmed(
+def _bent_paths() -> NDArray[np.float64]:
+    """Return the path shapes that every long leg is tried with; the first is straight."""
+    bent = _SPREAD * np.random.default_rng(1).standard_normal((1 + _N_BENT, 5, 3))
+    bent[0] = 0.0
+    return bent
+
+
+def _confirmed(
     legs: Legs,
     throttles: NDArray[np.float64],
     m0: NDArray[np.float64],
@@ -94,3 +119,20 @@ def confirmed(
         start=np.where(good, start, -1).astype(np.int16),
         seconds=seconds,
     )
+
+
+def _with_reference(legs: Legs, solutions: LegSolutions, n_segments: int) -> LegSolutions:
+    """Return the solutions with the rows that did not converge solved by the reference."""
+    from feasibility.sims_flanagan.reference import reference_max_initial_mass
+
+    rows = np.flatnonzero(~solutions.converged)
+    if not len(rows):
+        return solutions
+    rest = reference_max_initial_mass(legs.take(rows), n_segments=n_segments)
+    merged = {}
+    for name in LegSolutions.__dataclass_fields__:
+        merged[name] = getattr(solutions, name).copy()
+        merged[name][rows] = getattr(rest, name)
+    merged["start"][rows] = np.where(rest.converged, 100 + rest.start, -1)
+    merged["seconds"][rows] += solutions.seconds[rows]
+    return LegSolutions(**merged)

@@ -12,7 +12,7 @@ from feasibility.sims_flanagan.fast_algebra_kernels import (
     solve_lower,
     solve_lower_transposed,
 )
-from feasibility.sims_flanagan.fast_dual_kernels import least_thrust, whiten
+from feasibility.sims_flanagan.fast_dual_kernels import least_thrust, whiten, z_of_impulses
 from feasibility.sims_flanagan.fast_element_kernels import (
     element_derivatives,
     from_elements,
@@ -78,7 +78,7 @@ def draw_path(e0, e1, tof, turns, n, shape, nodes):
 
 
 @kernel
-def lifted_sweep(e0, e1, longitude, dt, n, n_forward, c, first, nodes, dv, z, lam, w):
+def lifted_sweep(e0, e1, longitude, dt, n, n_forward, c, first, gentle, nodes, dv, z, lam, w):
     """Bend a path of nodes and its impulses towards a true arc of least thrust.
 
     One lifted Newton step: every node is an unknown of its own, condensed to the
@@ -164,9 +164,17 @@ def lifted_sweep(e0, e1, longitude, dt, n, n_forward, c, first, nodes, dv, z, la
     if not whiten(b, n, one, w.m[LOWER]):
         return -1.0, np.inf
     solve_lower(w.m[LOWER], total)
-    multiply_lower_transposed(w.m[LOWER], lam)
-    z = least_thrust(b, total, n, n_forward, c, lam, z, dv, linear, w)
-    solve_lower_transposed(w.m[LOWER], lam)
+    if gentle:
+        for i in range(n):
+            for k in range(3):
+                linear[i, k] = 0.0
+                for j in range(6):
+                    linear[i, k] += b[i, j, k] * total[j]
+        z = z_of_impulses(linear, n, n_forward, c)
+    else:
+        multiply_lower_transposed(w.m[LOWER], lam)
+        z = least_thrust(b, total, n, n_forward, c, lam, z, dv, linear, w)
+        solve_lower_transposed(w.m[LOWER], lam)
     if not z > 0.0:
         return -1.0, np.inf
     # How the nodes move with the impulses.

@@ -27,6 +27,8 @@ _FIRST_SWEEPS = 2
 _SWEEPS = 20
 _SCREEN = 3.0
 _RELAX = 0.5
+_GENTLE = 3
+_SHORT = math.pi
 _LOST = 1.25
 _HOPELESS = 1.03
 _LIKELY = 1.3
@@ -74,8 +76,12 @@ def likely_turn(k, best, w):
 
 
 @kernel
-def begin(s, turns, shape, tof, c, n, w):
-    """Draw path `s` and take its first lifted steps; its z goes to w.v[Z, s], inf where none."""
+def begin(s, turns, gentle, shape, tof, c, n, w):
+    """Draw path `s` and take its first lifted steps; its z goes to w.v[Z, s], inf where none.
+
+    The first `gentle` steps go for the least sum of squares instead of the least thrust,
+    which often leads to another optimum.
+    """
     nodes, dv, lam = w.n6[NODES + s], w.n3[STARTS + s], w.v[START_LAM + s]
     e0, e1 = w.v[E0], w.v[E1]
     w.v[Z, s] = np.inf
@@ -89,9 +95,22 @@ def begin(s, turns, shape, tof, c, n, w):
         for j in range(3):
             dv[i, j] = 0.0
     z = -1.0
-    for sweep in range(_FIRST_SWEEPS):
+    for sweep in range(_FIRST_SWEEPS + gentle):
         z, _ = lifted_sweep(
-            e0, e1, longitude, tof / n, n, n // 2, c, sweep == 0, nodes, dv, z, lam, w
+            e0,
+            e1,
+            longitude,
+            tof / n,
+            n,
+            n // 2,
+            c,
+            sweep == 0,
+            sweep < gentle,
+            nodes,
+            dv,
+            z,
+            lam,
+            w,
         )
         if not z > 0.0 or advance(nodes, dv, n, 1.0, 0, w) < 0:
             return
@@ -110,7 +129,7 @@ def pursue(s, x0, tof, c, n, best, w):
     count = 0
     for sweep in range(_SWEEPS):
         z, move = lifted_sweep(
-            e0, e1, w.v[LONGITUDE, s], dt, n, n_forward, c, False, nodes, start, z, lam, w
+            e0, e1, w.v[LONGITUDE, s], dt, n, n_forward, c, False, False, nodes, start, z, lam, w
         )
         if not z > 0.0 or move < 3e-3:
             break
@@ -131,7 +150,7 @@ def pursue(s, x0, tof, c, n, best, w):
 
 
 @kernel
-def maximum_one(x0, x1, tof, c, n, shapes, w, best_dv):
+def maximum_one(x0, x1, tof, c, n, bent, shapes, w, best_dv):
     """Find the least z of one scaled leg.
 
     Parameters
@@ -142,8 +161,10 @@ def maximum_one(x0, x1, tof, c, n, shapes, w, best_dv):
         Flight time and exhaust velocity.
     n : int
         Segments.
+    bent : (b, 5, 3) float64
+        Path shapes to be tried besides the plain paths unless the leg is short.
     shapes : (k, 5, 3) float64
-        Random path shapes to be tried besides the plain paths.
+        Path shapes to be tried on every leg.
     w : Workspace
     best_dv : (n, 3) float64
         Receives the impulses.
@@ -151,7 +172,8 @@ def maximum_one(x0, x1, tof, c, n, shapes, w, best_dv):
     Returns
     -------
     float, int
-        z = T dt / (m0 c) of the best arc, inf where none; the start that won.
+        z = T dt / (m0 c) of the best arc, inf where none; the start that won: the number of
+        turns for 0 to 4 (`turns_of`), then the bent paths, then any of the random ones.
     """
     best = np.inf
     winner = -1
@@ -159,20 +181,22 @@ def maximum_one(x0, x1, tof, c, n, shapes, w, best_dv):
         return best, winner
     plain = np.zeros((5, 3))
     for s in range(_N_TURNS):
-        begin(s, turns_of(s), plain, tof, c, n, w)
+        begin(s, turns_of(s), 0, plain, tof, c, n, w)
         w.v[TURN_Z, s] = w.v[Z, s]
-    n_shapes = shapes.shape[0]
-    for attempt in range(_N_TURNS + n_shapes):
-        if attempt < _N_TURNS:
+    # On short legs all starts agree.
+    n_bent = bent.shape[0] if w.v[LONGITUDE, 0] - w.v[E0, 5] > _SHORT else 0
+    for attempt in range(_N_TURNS + n_bent + shapes.shape[0]):
+        k = attempt - _N_TURNS
+        if k < 0:
             s = np.argmin(w.v[Z, :_N_TURNS])
             start = s
             if not w.v[Z, s] < _SCREEN * best:
                 continue
         else:
             s = _N_TURNS
-            start = attempt
-            turn = likely_turn(attempt - _N_TURNS, best, w)
-            begin(s, turns_of(turn), shapes[attempt - _N_TURNS], tof, c, n, w)
+            start = attempt if k < n_bent else _N_TURNS + bent.shape[0]
+            shape = bent[k] if k < n_bent else shapes[k - n_bent]
+            begin(s, turns_of(likely_turn(k, best, w)), _GENTLE, shape, tof, c, n, w)
         z = np.inf
         if w.v[Z, s] < np.inf:
             z = pursue(s, x0, tof, c, n, best, w)
@@ -189,7 +213,7 @@ def maximum_one(x0, x1, tof, c, n, shapes, w, best_dv):
 
 
 @kernel
-def maximum_batch(rv0, rv1, tof, c, n, mu, shapes, throttles, z_out, winner, mass_ratio):
+def maximum_batch(rv0, rv1, tof, c, n, mu, bent, shapes, throttles, z_out, winner, mass_ratio):
     """Solve every leg of a batch, SI units; rows without a solution keep z = inf, winner = -1.
 
     Parameters
@@ -202,8 +226,8 @@ def maximum_batch(rv0, rv1, tof, c, n, mu, shapes, throttles, z_out, winner, mas
         Segments.
     mu : float
         Gravitational parameter.
-    shapes : (legs, k, 5, 3) float64
-        Random path shapes, see `maximum_one`.
+    bent, shapes : (b, 5, 3) float64, (legs, k, 5, 3) float64
+        Path shapes, see `maximum_one`.
     throttles : (legs, n, 3) float64
         Receives the throttles.
     z_out : (legs,) float64
@@ -230,7 +254,7 @@ def maximum_batch(rv0, rv1, tof, c, n, mu, shapes, throttles, z_out, winner, mas
                 x1[i] += frame[i, j] * rv1[row, j] / length
                 x1[3 + i] += frame[i, j] * rv1[row, 3 + j] / speed
         ce = c[row] / speed
-        z, s = maximum_one(x0, x1, tof[row] * speed / length, ce, n, shapes[row], w, dv)
+        z, s = maximum_one(x0, x1, tof[row] * speed / length, ce, n, bent, shapes[row], w, dv)
         z_out[row] = z
         winner[row] = s
         if s < 0:
