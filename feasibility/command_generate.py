@@ -117,7 +117,7 @@ def _executor(workers: int, scheduler: str | None) -> Iterator[tuple[Executor | 
             "--scheduler needs dask, which is not installed; pip install 'seqsearch[dask]'"
         ) from None
     try:
-        client = distributed.Client(scheduler, timeout=10)
+        client = distributed.Client(scheduler, timeout=5)
     except (OSError, ValueError) as error:
         raise InputError(f"--scheduler {scheduler}: no Dask scheduler there ({error})") from None
     with client:

@@ -25,8 +25,8 @@ from feasibility.workers import worker_pool
 
 PROTOCOL = """\
 name = "small"
-solver = "reference"
-legs_per_shard = 2
+solver = "fast"
+legs_per_shard = 40
 propellant = false
 boundary_share = 0.7
 
@@ -49,7 +49,7 @@ synthetic_bodies = 60
 step_days = 50.0
 fine_step_days = 10.0
 """
-LEGS = 9
+LEGS = 590
 
 
 @pytest.fixture(scope="module")
@@ -146,8 +146,8 @@ def test_any_number_of_workers_gives_the_same_rows(protocol_file, undisturbed, t
 
 def test_a_larger_dataset_begins_with_the_rows_of_a_smaller(protocol_file, undisturbed, tmp_path):
     folder = tmp_path / "data"
-    assert generate(protocol_file, folder, legs=3) == 0
-    assert_same_rows(read_dataset(folder), undisturbed, rows=3)
+    assert generate(protocol_file, folder, legs=50) == 0
+    assert_same_rows(read_dataset(folder), undisturbed, rows=50)
     first = shard_path(folder, 0).stat().st_mtime_ns
     assert generate(protocol_file, folder) == 0
     assert_same_rows(undisturbed, read_dataset(folder))
@@ -168,9 +168,9 @@ def test_kill_9_and_resume_gives_the_dataset_of_an_undisturbed_run(
             assert time.monotonic() < deadline, "workers outlive their killed parent"
             time.sleep(0.1)
     finished = {name: (folder / name).stat().st_mtime_ns for name in shards(folder)}
-    assert len(finished) < 5
+    assert len(finished) < 15
     # What a kill in the middle of a write leaves behind.
-    (folder / ".part-00004.parquet.x1y2z3").write_bytes(b"half a sh")
+    (folder / ".part-00014.parquet.x1y2z3").write_bytes(b"half a sh")
     with pytest.raises(InputError, match="missing"):
         read_dataset(folder)
     assert generate(protocol_file, folder) == 0
@@ -198,10 +198,10 @@ def test_ctrl_c_stops_cleanly_and_says_how_to_go_on(protocol_file, tmp_path):
         _, errors = process.communicate(timeout=60)
     assert process.returncode == 130
     assert b"Traceback" not in errors
-    assert re.search(rb"interrupted; \d+ of 9 legs are written, the same command goes on", errors)
+    assert re.search(rb"interrupted; \d+ of 590 legs are written, the same command goes on", errors)
     protocol = read_protocol(str(protocol_file))
     missing = begin(protocol, LEGS, folder).legs_missing
-    assert missing == LEGS - 2 * len(shards(folder))
+    assert missing == LEGS - 40 * len(shards(folder))
 
 
 def test_a_full_disk_is_one_line_and_leaves_the_earlier_shards(
@@ -231,12 +231,12 @@ def test_a_full_disk_is_one_line_and_leaves_the_earlier_shards(
 
 def test_a_really_full_disk_is_one_line_too(protocol_file, tmp_path, capsys):
     mounted = subprocess.run(
-        ["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", str(tmp_path)], check=False
+        ["mount", "-t", "tmpfs", "-o", "size=128k", "tmpfs", str(tmp_path)], check=False
     )
     if mounted.returncode:
         pytest.skip("mounting a small file system needs privileges")
     try:
-        (tmp_path / "ballast").write_bytes(bytes(36 * 1024))
+        (tmp_path / "ballast").write_bytes(bytes(60 * 1024))
         assert generate(protocol_file, tmp_path / "data") == 2
         assert re.fullmatch(
             r"feasibility: .*: cannot be written \(No space left.*\)\n", capsys.readouterr().err
@@ -278,7 +278,7 @@ def test_other_settings_are_refused_and_named(protocol_file, tmp_path, capsys):
     assert generate(other, folder) == 2
     assert "protocol.spacecraft.thrust_n = 0.5, now 0.6" in error_of(capsys)
     assert generate(protocol_file, folder, legs=5) == 2
-    assert "was begun with --legs 9, expected no fewer" in error_of(capsys)
+    assert "was begun with --legs 590, expected no fewer" in error_of(capsys)
     assert (folder / METADATA).read_bytes() == before
 
 
@@ -320,9 +320,10 @@ def test_options_that_cannot_be_used_are_one_line(
 
 def test_propellant_is_solved_where_the_leg_is_flyable(protocol_file, tmp_path):
     file = tmp_path / "propellant.toml"
-    file.write_text(PROTOCOL.replace("propellant = false", "propellant = true"))
+    text = PROTOCOL.replace("propellant = false", "propellant = true").replace("6000", "1100")
+    file.write_text(text.replace('"fast"', '"reference"'))
     protocol = read_protocol(str(file))
-    task = begin(protocol, 3, tmp_path / "data").tasks[0]
+    task = begin(protocol, 2, tmp_path / "data").tasks[0]
     shard = make_shard(task)
     flyable = shard["log_margin"] >= 0
     assert flyable.any()
@@ -355,8 +356,7 @@ def test_inspect_solves_a_sample_again(protocol_file, tmp_path):
     assert generate(protocol_file, folder, legs=3) == 0
     text = inspect_dataset(folder, resolve=2)
     assert "2 legs solved again" in text
-    # The dataset was labelled by the same solver.
-    assert re.search(r"m\* equal within 0\.2 % +2 +100\.00 %", text)
+    assert re.search(r"same side of the boundary +2 +100\.00 %", text)
 
 
 def error_of(capsys) -> str:

@@ -16,8 +16,8 @@ distributed = pytest.importorskip("distributed")
 
 PROTOCOL = """\
 name = "dask"
-solver = "reference"
-legs_per_shard = 1
+solver = "fast"
+legs_per_shard = 20
 propellant = false
 
 [sampler]
@@ -36,7 +36,7 @@ synthetic_bodies = 60
 step_days = 50.0
 fine_step_days = 10.0
 """
-LEGS = 12
+LEGS = 2000
 
 
 @pytest.mark.slow
