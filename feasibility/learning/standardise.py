@@ -19,7 +19,8 @@ class Standardiser:
     mean : (k,) float64
         In the feature's unit.
     std : (k,) float64
-        In the feature's unit; 1 for a feature that is constant in training.
+        In the feature's unit; for a feature that is constant in training, its
+        size, or 1 if it is zero.
     """
 
     mean: NDArray[np.float64]
@@ -30,8 +31,9 @@ class Standardiser:
         """Measure mean and standard deviation of training features (n, k)."""
         mean, std = X.mean(axis=0), X.std(axis=0)
         # Below rounding the spread is noise: a constant feature must not be blown up by it.
-        constant = std <= 1e-12 * np.abs(mean)
-        return cls(mean, np.where(constant, 1.0, std))
+        size = np.abs(mean)
+        constant = std <= 1e-12 * size
+        return cls(mean, np.where(constant, np.where(size > 0.0, size, 1.0), std))
 
     def transform(self, X: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return (n, k) standardised features."""
