@@ -283,3 +283,10 @@ def test_the_spacecraft_is_given_where_it_is_not_drawn_and_only_there(tmp_path):
 def test_an_unknown_protocol_lists_the_known_ones():
     with pytest.raises(InputError, match="built-in protocols are general, limited, paper"):
         read_protocol("tabel1")
+
+
+def test_independent_orbits_have_time_for_the_transfer():
+    legs = draw("general", 6, n=500, near_share=0.0).legs
+    dep, arr = cartesian_to_classical(legs.rv_dep), cartesian_to_classical(legs.rv_arr)
+    hohmann_s = np.pi * np.sqrt(((dep[:, 0] + arr[:, 0]) / 2) ** 3 / MU_SUN)
+    assert (legs.tof_s >= 0.6 * hohmann_s * (1 - 1e-9)).all()

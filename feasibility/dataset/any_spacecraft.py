@@ -59,6 +59,9 @@ class AnySpacecraft(
         Range of the relative disturbance of near pairs, log-uniform.
     revolutions : pair of float
         Flight times in periods of the smaller orbit, uniform.
+    hohmann_share_min : float
+        Independent pairs have at least this share of the Hohmann transfer's time:
+        less is beyond any spacecraft of these ranges.
     acceleration_m_s2 : pair of float
         Thrust over initial mass, log-uniform.
     isp_s : pair of float
@@ -79,6 +82,7 @@ class AnySpacecraft(
     near_share: _Share = 0.6
     disturbance: _Range = (0.003, 0.3)
     revolutions: _Range = (0.05, 2.0)
+    hohmann_share_min: Annotated[float, Meta(ge=0)] = 0.6
     acceleration_m_s2: _Range = (1e-5, 1e-3)
     isp_s: _Range = (1000.0, 6000.0)
     m0_kg: _Range = (100.0, 5000.0)
@@ -163,7 +167,10 @@ class AnySpacecraft(
         tof_s = rng.uniform(*self.revolutions, m) * 2.0 * np.pi * np.sqrt(smaller**3 / MU_SUN)
         coasted = np.sqrt(MU_SUN / departure[:, 0] ** 3) * tof_s
         arrival[near, 5] += coasted[near]
-        kept = self._within(departure) & self._within(arrival)
+        transfer = 0.5 * (departure[:, 0] + arrival[:, 0])
+        hohmann_s = np.pi * np.sqrt(transfer**3 / MU_SUN)
+        kept = near | (tof_s >= self.hohmann_share_min * hohmann_s)
+        kept &= self._within(departure) & self._within(arrival)
         columns = {
             "departure": departure,
             "arrival": arrival,
