@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
-from feasibility import command_evaluate, command_train
+from feasibility import command_evaluate, command_study, command_train
 from feasibility.errors import InputError, MissingDependencyError
 
 _DESCRIPTION: Final = """\
@@ -102,6 +102,7 @@ def _parser() -> argparse.ArgumentParser:
     protocols.set_defaults(run=_protocols)
     command_train.add_parser(commands)
     command_evaluate.add_parser(commands)
+    command_study.add_parser(commands)
     return parser
 
 

@@ -3,7 +3,8 @@
 import hashlib
 import json
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor, as_completed
 from pathlib import Path
 from typing import Any, final
 
@@ -65,15 +66,46 @@ class Cells:
         path = self.path(name, key)
         if path.exists():
             self.reused += 1
-            return self._read(path)["value"]
-        began = time.perf_counter()
-        value = compute()
-        seconds = time.perf_counter() - began
+        else:
+            self._write(path, name, key, _timed(compute))
+        # Read back, so that a first run sees exactly what a later one will see.
+        return self._read(path)["value"]
+
+    def get_many(
+        self,
+        wanted: Sequence[tuple[str, Key, Callable[[], Any]]],
+        executor: Executor | None,
+    ) -> list[Any]:
+        """Return the values of several cells; those not there are computed by the executor.
+
+        Parameters
+        ----------
+        wanted : sequence of (name, key, compute)
+            As for `get`; for a process pool `compute` has to be picklable.
+        executor : Executor, optional
+            Where to compute; in this process if not given.
+
+        Raises
+        ------
+        InputError
+            As for `get`.
+        """
+        if executor is not None:
+            missing = [cell for cell in wanted if not self.path(cell[0], cell[1]).exists()]
+            running = {
+                executor.submit(_timed, compute): (name, key) for name, key, compute in missing
+            }
+            for future in as_completed(running):
+                name, key = running[future]
+                self._write(self.path(name, key), name, key, future.result())
+            self.reused -= len(missing)
+        return [self.get(*cell) for cell in wanted]
+
+    def _write(self, path: Path, name: str, key: Key, timed: tuple[Any, float]) -> None:
+        value, seconds = timed
         write_text(path, json.dumps({"key": key, "seconds": seconds, "value": value}) + "\n")
         self.computed += 1
         self.say(f"{name}  {seconds:.1f} s")
-        # Read back, so that a first run sees exactly what a later one will see.
-        return self._read(path)["value"]
 
     def seconds(self, name: str, key: Key) -> float:
         """Return how long the cell took to compute.
@@ -100,3 +132,8 @@ class Cells:
         if not isinstance(cell, dict) or not {"key", "seconds", "value"} <= set(cell):
             raise InputError(f"{path}: expected a cell with key, seconds and value")
         return cell
+
+
+def _timed(compute: Callable[[], Any]) -> tuple[Any, float]:
+    began = time.perf_counter()
+    return compute(), time.perf_counter() - began

@@ -32,6 +32,10 @@ class Context:
         Folder of the study.
     workers : int
         Processes of what runs in parallel.
+    threads : int
+        Threads of a network's training.
+    device : str
+        Where networks are trained: "cpu", "cuda" or "auto".
     say : callable
         Told what is going on, a line at a time.
     """
@@ -41,6 +45,8 @@ class Context:
     cells: Cells
     out: Path
     workers: int
+    threads: int
+    device: str
     say: Callable[[str], None]
 
     def cell_key(self, **settings: object) -> Key:

@@ -148,7 +148,8 @@ class StudyData:
         """Return the rows of one fold, balanced."""
         rows = self.pool[self.folds == fold]
         rng = np.random.default_rng([seed, _BALANCE, fold])
-        return rows[balanced_rows(self.y[rows], rng)]
+        balanced: NDArray[np.int64] = rows[balanced_rows(self.y[rows], rng)]
+        return balanced
 
     @property
     def smaller_class(self) -> int:
@@ -161,8 +162,10 @@ def _balanced_test(
     rows: NDArray[np.int64], y: NDArray[np.bool_], most: int, rng: np.random.Generator
 ) -> NDArray[np.int64]:
     per_class = min(most // 2, int(y[rows].sum()), int((~y[rows]).sum()))
-    parts = [rng.choice(rows[y[rows] == value], per_class, replace=False) for value in (True, False)]
-    return np.sort(np.concatenate(parts))
+    parts = [
+        rng.choice(rows[y[rows] == value], per_class, replace=False) for value in (True, False)
+    ]
+    return np.sort(np.concatenate(parts)).astype(np.int64)
 
 
 def _digest(*arrays: NDArray[np.generic]) -> str:

@@ -29,7 +29,9 @@ NAMES: Final = {
 """Name of each model as the paper prints it."""
 
 
-def panels(n: int, *, columns: int = 2, width: float = 4.2, height: float = 3.2) -> "Any":
+def panels(
+    n: int, *, columns: int = 2, width: float = 4.2, height: float = 3.2
+) -> "tuple[Figure, list[Axes]]":
     """Return ``figure, axes`` with n panels, n axes in a flat list; no display is needed."""
     from matplotlib.figure import Figure
 

@@ -11,15 +11,16 @@ from numpy.typing import NDArray
 
 from feasibility.learning.balance import adasyn
 from feasibility.learning.metrics import roc_curve, summary
-from feasibility.learning.models import Epoch, Model, make_model
+from feasibility.learning.models import PRESETS, Epoch, Model, make_model
 from feasibility.learning.standardise import Standardiser
 from feasibility.learning.study.context import Context
 from feasibility.learning.study.paper_values import SELECTED_FEATURES
-from feasibility.learning.study.presets import NETWORKS
 
 _ROC_POINTS: Final = 201
-_TRAIN = 4
+_TRAIN: Final = 4
 """Stream of random numbers of the training itself."""
+
+_WHERE: Final = ("threads", "device")
 
 MARGIN_EDGES: Final = (0.0, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
 """Edges of the bins of abs(log(m*/m0)) in which right answers are counted; the last is open."""
@@ -82,7 +83,7 @@ class Outcome:
     fit_seconds, predict_seconds : float
         Wall-clock times.
     epochs : list of dict
-        The model's `Epoch` records, if it learns by epochs.
+        The model's `Epoch` records, where the test rows were followed through them.
     """
 
     metrics: dict[str, float]
@@ -101,9 +102,40 @@ def roc_grid() -> NDArray[np.float64]:
     return np.linspace(0.0, 1.0, _ROC_POINTS) ** 2
 
 
-def build_model(name: str, epochs: int) -> Model:
-    """Return a model of the study, not fitted: Table 5's networks learn for `epochs`."""
-    return make_model(name, epochs=epochs) if name in NETWORKS else make_model(name)
+def build_model(context: Context, name: str, legs: int) -> Model:
+    """Return a model of the study, not fitted: networks as in Table 5, baselines by default.
+
+    Where the preset's epochs would give a network fewer than its least number of
+    steps, epochs are added and the drops of the learning rate spread in proportion:
+    a small training set is then judged by its legs, not by a training cut short.
+
+    Parameters
+    ----------
+    context : Context
+        The study.
+    name : str
+        A name of `presets.MODELS`.
+    legs : int
+        Training legs.
+    """
+    if name not in PRESETS:
+        return make_model(name)
+    preset, hyperparameters = context.preset, PRESETS[name][0]
+    steps_of_an_epoch = max(1, round(legs / hyperparameters["batch"]))
+    epochs = max(preset.epochs, -(-preset.least_steps // steps_of_an_epoch))
+    return make_model(
+        name,
+        drop_period=round(hyperparameters["drop_period"] * epochs / preset.epochs),
+        epochs=epochs,
+        keep_best=False,
+        threads=context.threads,
+        device=context.device,
+    )
+
+
+def recipe(model: Model) -> dict[str, Any]:
+    """Return the model's hyperparameters without those that only say where it is computed."""
+    return {name: value for name, value in model.config.items() if name not in _WHERE}
 
 
 def run_fit(context: Context, fit: Fit, *, validate: bool = False) -> Outcome:
@@ -118,12 +150,12 @@ def run_fit(context: Context, fit: Fit, *, validate: bool = False) -> Outcome:
     validate : bool
         Follow the test rows through the epochs (the training never sees them).
     """
-    model = build_model(fit.model, context.preset.epochs)
+    model = build_model(context, fit.model, fit.feasible + fit.infeasible)
     columns = context.columns(fit.n_features)
     key = context.cell_key(
         kind="fit",
         fit=asdict(fit),
-        config=model.config,
+        config=recipe(model),
         columns=hashlib.sha256(columns.tobytes()).hexdigest()[:16],
         validate=validate,
     )
@@ -167,7 +199,7 @@ def _compute(
         synthetic=len(y) - len(train),
         fit_seconds=fitted - began,
         predict_seconds=predicted - fitted,
-        epochs=[asdict(epoch) for epoch in epochs],
+        epochs=[asdict(epoch) for epoch in epochs] if validate else [],
     )
 
 

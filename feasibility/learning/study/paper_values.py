@@ -80,11 +80,3 @@ SELECTED_FEATURES: Final = 60
 
 FEASIBLE_SHARE: Final = 0.07
 """Share of random pairs whose optimisation converges."""
-
-FIGURE_2: Final = (
-    ("time of flight and initial mass", "first"),
-    ("dt_imp and Lambert delta-v", "high"),
-    ("equinoctial and classical elements", "above position and velocity"),
-    ("angular momentum", "above energy"),
-)
-"""Fig. 2: what the text says of the ranking."""

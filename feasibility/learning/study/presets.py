@@ -35,6 +35,8 @@ class Preset:
         Most test legs, after balancing.
     epochs : int
         Epochs of a network.
+    least_steps : int
+        Least steps of a network: epochs are added where the training set is small.
     data_size : mapping of str to tuple of int
         Fig. 3: training sizes of each model (balanced).
     data_size_seeds : int
@@ -72,6 +74,7 @@ class Preset:
     test_share: float
     test_rows: int
     epochs: int
+    least_steps: int
     data_size: Mapping[str, tuple[int, ...]]
     data_size_seeds: int
     comparison: Mapping[str, int]
@@ -110,6 +113,7 @@ _QUICK: Final = Preset(
     test_share=0.2,
     test_rows=2000,
     epochs=12,
+    least_steps=150,
     data_size=_same((250, 500, 1000, 2000), "ensemble", "knn", "svm", "tree", "dnn1"),
     data_size_seeds=3,
     comparison=dict.fromkeys(MODELS, 2000),
@@ -138,6 +142,7 @@ _LAPTOP: Final = Preset(
     test_share=0.06,
     test_rows=20_000,
     epochs=24,
+    least_steps=1000,
     data_size={
         **_same((1000, 2000, 5000, 10_000, 20_000, 50_000), "ensemble", "knn", "tree"),
         "svm": (1000, 2000, 5000, 10_000, 20_000, 30_000),
@@ -177,6 +182,7 @@ _PAPER: Final = Preset(
     test_share=0.06,
     test_rows=40_000,
     epochs=40,
+    least_steps=1000,
     data_size={
         **_same((1000, 2000, 5000, 10_000, 20_000, 30_000, 50_000), "ensemble", "knn", "tree"),
         "svm": (1000, 2000, 5000, 10_000, 20_000, 30_000),

@@ -26,12 +26,27 @@ _RESULT: Final = "result.json"
 @final
 @dataclass(frozen=True)
 class Table:
-    """A table: `name` is its file name without ending, rows are as wide as `columns`."""
+    """A table; rows are as wide as `columns`.
+
+    Attributes
+    ----------
+    name : str
+        File name without ending.
+    title : str
+        Heading in the report.
+    columns : tuple of str
+        Names of the columns.
+    rows : tuple of tuple
+        Entries.
+    most_rows : int, optional
+        How many rows the report shows, 0 for none of the table; the files have all.
+    """
 
     name: str
     title: str
     columns: tuple[str, ...]
     rows: tuple[tuple[Value, ...], ...]
+    most_rows: int | None = None
 
     def __post_init__(self) -> None:
         for row in self.rows:
@@ -46,10 +61,10 @@ class Table:
         writer.writerows(["" if value is None else value for value in row] for row in self.rows)
         return text.getvalue()
 
-    def markdown(self) -> str:
-        """Return the table as Markdown, numbers to four decimals."""
+    def markdown(self, most_rows: int | None = None) -> str:
+        """Return the table, or its first rows, as Markdown; numbers to four decimals."""
         lines = [self.columns, ["---"] * len(self.columns)]
-        lines += [[_shown(value) for value in row] for row in self.rows]
+        lines += [[_shown(value) for value in row] for row in self.rows[:most_rows]]
         return "\n".join("| " + " | ".join(line) + " |" for line in lines) + "\n"
 
 
@@ -150,6 +165,7 @@ class Result:
                     title=table["title"],
                     columns=tuple(table["columns"]),
                     rows=tuple(tuple(row) for row in table["rows"]),
+                    most_rows=table["most_rows"],
                 )
                 for table in plain["tables"]
             )
@@ -168,7 +184,11 @@ class Result:
         """Return the section of the report; figures are linked from `figure_folder`."""
         parts = [f"## {self.title}", self.about]
         for table in self.tables:
-            parts += [f"**{table.title}**", table.markdown().rstrip()]
+            if table.most_rows == 0:
+                continue
+            parts += [f"**{table.title}**", table.markdown(table.most_rows).rstrip()]
+            if table.most_rows is not None and len(table.rows) > table.most_rows:
+                parts.append(f"(the first {table.most_rows} of {len(table.rows)} rows)")
         parts += [
             f"![{self.title}]({figure_folder}{self.name}/{figure}.png)" for figure in self.figures
         ]
