@@ -13,6 +13,7 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from feasibility.constants import MU_SUN
+from feasibility.errors import InputError
 from feasibility.legs import Legs
 from feasibility.sims_flanagan.pykep_leg import N_SEGMENTS, confirm
 from feasibility.sims_flanagan.solutions import (
@@ -27,6 +28,8 @@ from feasibility.sims_flanagan.solutions import (
 # remain moderate ellipses.
 _SPREAD: Final = 0.2 / np.array([1.0, 2.0, 3.0])
 _N_BENT: Final = 3
+# Rounding of masses that went through a file or through units.
+_MASS_ROUNDING: Final = 1e-6
 
 
 def fast_max_initial_mass(
@@ -88,6 +91,78 @@ def fast_max_initial_mass(
     m0 = legs.thrust * legs.tof_s / n_segments / (z * legs.exhaust_velocity)
     solutions = _confirmed(legs, throttles, m0, m0 * ratio, start, seconds)
     return _with_reference(legs, solutions, n_segments) if fallback else solutions
+
+
+def fast_min_propellant(
+    legs: Legs, *, guess: LegSolutions | None = None, n_segments: int = N_SEGMENTS
+) -> LegSolutions:
+    """Return the solution of largest final mass of each leg at its own initial mass.
+
+    As only thrust over mass enters the motion, the maximum-initial-mass solution with
+    its throttles times m0 / m* closes the leg at m0: it is the start.
+
+    Parameters
+    ----------
+    legs : Legs
+        n legs.
+    guess : LegSolutions, optional
+        Closed solutions of the same legs at the same or a larger initial mass;
+        `fast_max_initial_mass` finds them if not given.
+    n_segments : int
+        Number of segments, s; that of `guess` if that is given.
+
+    Returns
+    -------
+    LegSolutions
+        n rows; `start` is that of the guess. Rows heavier than the guess are
+        `Status.TOO_HEAVY`, rows that need more propellant than there is
+        `Status.BELOW_DRY_MASS`.
+
+    Raises
+    ------
+    InputError
+        `guess` has another number of rows.
+    """
+    from feasibility.sims_flanagan.fast_propellant_kernels import minimum_batch
+
+    if guess is None:
+        guess = fast_max_initial_mass(legs, n_segments=n_segments)
+    if len(guess) != len(legs):
+        raise InputError(f"fast_min_propellant: {len(guess)} guesses for {len(legs)} legs")
+    solutions = LegSolutions.unsolved(len(legs), guess.n_segments)
+    too_heavy = guess.converged & (legs.m0 > guess.m0 * (1.0 + _MASS_ROUNDING))
+    solutions.status[too_heavy] = Status.TOO_HEAVY
+    rows = np.flatnonzero(guess.converged & ~too_heavy)
+    if not len(rows):
+        return solutions
+    flyable = legs.take(rows)
+    n = guess.n_segments
+    throttles = guess.throttles[rows] * (flyable.m0 / guess.m0[rows])[:, None, None]
+    z = flyable.thrust * flyable.tof_s / n / (flyable.m0 * flyable.exhaust_velocity)
+    ratio = np.zeros(len(rows))
+    began = time.thread_time()
+    minimum_batch(
+        flyable.rv_dep.copy(),
+        flyable.rv_arr.copy(),
+        flyable.tof_s,
+        flyable.exhaust_velocity,
+        z,
+        n,
+        MU_SUN,
+        throttles,
+        ratio,
+    )
+    seconds = np.full(len(rows), (time.thread_time() - began) / len(rows))
+    start = guess.start[rows].astype(np.int64)
+    m_final = flyable.m0 * ratio
+    found = _confirmed(flyable, throttles, flyable.m0, m_final, start, seconds)
+    merged = {name: getattr(solutions, name) for name in LegSolutions.__dataclass_fields__}
+    enough = found.converged & (found.m_final >= flyable.m_dry)
+    solutions.status[rows[found.converged & ~enough]] = Status.BELOW_DRY_MASS
+    for name, column in merged.items():
+        column[rows[enough]] = getattr(found, name)[enough]
+    solutions.seconds[rows] = seconds
+    return solutions
 
 
 def _bent_paths() -> NDArray[np.float64]:

@@ -8,6 +8,7 @@ from feasibility.jit import kernel
 from feasibility.sims_flanagan.fast_arc_kernels import close, improve
 from feasibility.sims_flanagan.fast_dual_kernels import z_of_impulses
 from feasibility.sims_flanagan.fast_element_kernels import to_elements
+from feasibility.sims_flanagan.fast_frame_kernels import scale_leg, write_throttles
 from feasibility.sims_flanagan.fast_lifted_kernels import advance, draw_path, lifted_sweep
 from feasibility.sims_flanagan.fast_workspace_kernels import (
     DV,
@@ -32,23 +33,6 @@ _SHORT = math.pi
 _LOST = 1.25
 _HOPELESS = 1.03
 _LIKELY = 1.3
-
-
-@kernel
-def rotation(x, frame):
-    """Write the rows of the frame: radial, along-track, normal of the state `x`."""
-    r = math.sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2])
-    for i in range(3):
-        frame[0, i] = x[i] / r
-    frame[2, 0] = x[1] * x[5] - x[2] * x[4]
-    frame[2, 1] = x[2] * x[3] - x[0] * x[5]
-    frame[2, 2] = x[0] * x[4] - x[1] * x[3]
-    h = math.sqrt(frame[2, 0] ** 2 + frame[2, 1] ** 2 + frame[2, 2] ** 2)
-    for i in range(3):
-        frame[2, i] /= h
-    frame[1, 0] = frame[2, 1] * frame[0, 2] - frame[2, 2] * frame[0, 1]
-    frame[1, 1] = frame[2, 2] * frame[0, 0] - frame[2, 0] * frame[0, 2]
-    frame[1, 2] = frame[2, 0] * frame[0, 1] - frame[2, 1] * frame[0, 0]
 
 
 @kernel
@@ -243,33 +227,11 @@ def maximum_batch(rv0, rv1, tof, c, n, mu, bent, shapes, throttles, z_out, winne
     x1 = np.empty(6)
     dv = np.empty((n, 3))
     for row in range(rv0.shape[0]):
-        length = math.sqrt(rv0[row, 0] ** 2 + rv0[row, 1] ** 2 + rv0[row, 2] ** 2)
-        speed = math.sqrt(mu / length)
-        rotation(rv0[row], frame)
-        for i in range(3):
-            x0[i] = x0[3 + i] = x1[i] = x1[3 + i] = 0.0
-            for j in range(3):
-                x0[i] += frame[i, j] * rv0[row, j] / length
-                x0[3 + i] += frame[i, j] * rv0[row, 3 + j] / speed
-                x1[i] += frame[i, j] * rv1[row, j] / length
-                x1[3 + i] += frame[i, j] * rv1[row, 3 + j] / speed
+        length, speed = scale_leg(rv0[row], rv1[row], mu, frame, x0, x1)
         ce = c[row] / speed
         z, s = maximum_one(x0, x1, tof[row] * speed / length, ce, n, bent, shapes[row], w, dv)
         z_out[row] = z
         winner[row] = s
         if s < 0:
             continue
-        total = 0.0
-        for i in range(n):
-            y = math.sqrt(dv[i, 0] ** 2 + dv[i, 1] ** 2 + dv[i, 2] ** 2) / ce
-            if i >= n // 2:
-                total += y
-            # throttle = dv m / (T dt) with the mass of the segment's convention.
-            scale = math.exp(-total) / (z * ce)
-            if i < n // 2:
-                total += y
-            for j in range(3):
-                throttles[row, i, j] = scale * (
-                    frame[0, j] * dv[i, 0] + frame[1, j] * dv[i, 1] + frame[2, j] * dv[i, 2]
-                )
-        mass_ratio[row] = math.exp(-total)
+        mass_ratio[row] = write_throttles(dv, z, ce, n, frame, throttles[row])

@@ -28,11 +28,12 @@ D_MOVED = 3
 D_NODES = D_MOVED + MEMORY
 NODES = D_NODES + MEMORY
 # Rows of Workspace.s: per segment, one number.
-NORM, TRIAL_NORM, Y, SLOPE, PINNED = range(5)
+NORM, TRIAL_NORM, Y, SLOPE, PINNED, CAP, THRESHOLD = range(7)
 # Rows of Workspace.m after the n transition matrices, counted from the end.
 HESSIAN, HESSIAN_LOWER, TURNED, LOWER, M_ONE, M_TWO = range(-1, -7, -1)
 # Rows of Workspace.v: six components; the first three are scratch of element_derivatives.
-X, GAP, TRIAL_GAP, TOTAL, WORK, E0, E1, LAM, Z, LONGITUDE, TURN_Z, START_LAM = range(3, 15)
+X, GAP, TRIAL_GAP, TOTAL, WORK, E0, E1, LAM, Z, LONGITUDE, TURN_Z, STEP, TRIAL_LAM = range(3, 16)
+START_LAM = 16
 
 
 class Workspace(NamedTuple):
@@ -55,5 +56,5 @@ def make_workspace(n):
         np.zeros((2, n, 6, 3)),
         np.zeros((n + 6, 6, 6)),
         np.zeros((START_LAM + N_STARTS, 6)),
-        np.zeros((5, n)),
+        np.zeros((7, n)),
     )
