@@ -1,7 +1,14 @@
 # Everything here sets itself up: on a fresh machine Python 3.11 or newer and make are enough.
 PYTHON ?= python3
 BIN := .venv/bin
+PIP := $(BIN)/pip install --quiet --disable-pip-version-check
 DEMO_RUN := runs/demo
+
+TORCH ?= torch==2.13.0
+# In CI the machine's own package sources decide.
+ifndef CI
+TORCH_INDEX ?= --index-url https://download.pytorch.org/whl/cpu
+endif
 
 .PHONY: demo test lint slow clean
 
@@ -31,9 +38,14 @@ clean:
 	$(PYTHON) -m venv .venv
 
 .venv/.run: pyproject.toml | .venv/bin/python
-	$(BIN)/pip install --quiet --disable-pip-version-check -e .
+	$(PIP) -e .
 	touch $@
 
-.venv/.dev: pyproject.toml | .venv/bin/python
-	$(BIN)/pip install --quiet --disable-pip-version-check -e ".[dev]"
+# PyPI's torch for Linux brings gigabytes of CUDA libraries: the CPU build is asked for first.
+.venv/.torch: | .venv/bin/python
+	$(PIP) --retries 0 --timeout 10 $(TORCH_INDEX) $(TORCH) 2>/dev/null || $(PIP) $(TORCH)
+	touch $@
+
+.venv/.dev: pyproject.toml | .venv/.torch
+	$(PIP) -e ".[dev,train]"
 	touch $@ .venv/.run
