@@ -47,6 +47,10 @@ _OUTER = 40
 _NEWTON = 30
 _SHARPEST = 0.01
 _FLOOR = 1e-3
+_REJECTIONS = 4
+_ATTEMPTS = 4
+_CORRECTIONS = 8
+_CLOSED = 1e-11
 
 
 @kernel
@@ -69,17 +73,29 @@ def clip_to_thrust(dv, n, n_forward, c, z, cap):
 
 
 @kernel
-def restore_bounded(x0, dv, n, n_forward, dt, c, z, target, tolerance, iterations, w):
+def restore_bounded(x0, dv, n, n_forward, dt, c, z, target, w):
     """Close an arc without exceeding full thrust, by the segments that thrust; return whether.
 
-    Corrections are weighted by the thrust; a segment at full thrust only turns.
+    Corrections are weighted by the thrust; a segment at full thrust only turns. The
+    sensitivities at hand are used first, those of the arc itself where they fail.
     """
+    for attempt in range(_ATTEMPTS):
+        if attempt > 0 and not linearise(x0, dv, n, dt, target, w, w.v[TRIAL_GAP]) < np.inf:
+            return False
+        if _correct_bounded(x0, dv, n, n_forward, dt, c, z, target, w):
+            return True
+    return False
+
+
+@kernel
+def _correct_bounded(x0, dv, n, n_forward, dt, c, z, target, w):
+    """Correct with the sensitivities at hand until closed or no longer contracting."""
     b, gap, cap = w.b[0], w.v[TRIAL_GAP], w.s[CAP]
     gram, lower = w.m[M_ONE], w.m[M_TWO]
     along = w.v[WORK]
     clip_to_thrust(dv, n, n_forward, c, z, cap)
     size = whitened_gap(x0, dv, n, dt, target, w, gap)
-    if size < tolerance:
+    if size < _CLOSED:
         return True
     for i in range(6):
         for j in range(6):
@@ -98,7 +114,7 @@ def restore_bounded(x0, dv, n, n_forward, dt, c, z, target, tolerance, iteration
                 )
     if not cholesky(gram, lower):
         return False
-    for _ in range(iterations):
+    for _ in range(_CORRECTIONS):
         if not size < np.inf:
             return False
         solve_lower(lower, gap)
@@ -119,9 +135,9 @@ def restore_bounded(x0, dv, n, n_forward, dt, c, z, target, tolerance, iteration
             dv[k, 2] -= weight * (d2 - radial * dv[k, 2])
         clip_to_thrust(dv, n, n_forward, c, z, cap)
         new_size = whitened_gap(x0, dv, n, dt, target, w, gap)
-        if new_size < tolerance:
+        if new_size < _CLOSED:
             return True
-        if not new_size < 0.8 * size:
+        if not new_size < 0.5 * size:
             return False
         size = new_size
     return False
@@ -254,7 +270,7 @@ def minimise_one(x0, target, tof, c, z, n, dv, w):
     size = linearise(x0, dv, n, dt, target, w, gap)
     if not size < np.inf:
         return np.inf
-    if not restore_bounded(x0, dv, n, n_forward, dt, c, z, target, 1e-11, 10, w):
+    if not restore_bounded(x0, dv, n, n_forward, dt, c, z, target, w):
         return np.inf
     for i in range(n):
         threshold[i] = 1.0
@@ -263,6 +279,7 @@ def minimise_one(x0, target, tof, c, z, n, dv, w):
     best = clip_to_thrust(dv, n, n_forward, c, z, cap)
     sharpness = 0.3
     fraction = 1.0
+    rejected = 0
     for _ in range(_OUTER):
         size = linearise(x0, dv, n, dt, target, w, gap)
         if not size < np.inf:
@@ -292,7 +309,7 @@ def minimise_one(x0, target, tof, c, z, n, dv, w):
             for i in range(n):
                 for j in range(3):
                     trial[i, j] = dv[i, j] + fraction * (linear[i, j] - dv[i, j])
-            if restore_bounded(x0, trial, n, n_forward, dt, c, z, target, 1e-11, 10, w):
+            if restore_bounded(x0, trial, n, n_forward, dt, c, z, target, w):
                 new = clip_to_thrust(trial, n, n_forward, c, z, cap)
                 if new < best - 0.05 * fraction * (best - predicted):
                     accepted = True
@@ -307,10 +324,13 @@ def minimise_one(x0, target, tof, c, z, n, dv, w):
             fraction = min(1.0, 2.0 * fraction)
             if sharp and gain < 1e-5:
                 break
-        elif sharp:
-            break
         else:
+            # A softer answer moves less abruptly where thrust switches on and off.
+            rejected += 1
+            if rejected == _REJECTIONS:
+                break
             fraction = 1.0
+            sharpness = min(10.0 * sharpness, 0.3)
     return best
 
 
