@@ -159,6 +159,6 @@ def _draw(grid: Grid) -> "Figure":
                     markerfacecolor="none" if filled else COLOURS[model],
                     label=None if filled else NAMES[model],
                 )
-        axes.set(xlabel="infeasible legs for each feasible one (dashed: ADASYN)", ylabel=metric)
+        axes.set(xlabel="infeasible for each feasible (dashed: ADASYN)", ylabel=metric)
     legend(figure, all_axes[0])
     return figure
