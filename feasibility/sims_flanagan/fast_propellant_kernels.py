@@ -43,9 +43,9 @@ from feasibility.sims_flanagan.fast_workspace_kernels import (
     make_workspace,
 )
 
-_OUTER = 40
+_OUTER = 60
 _NEWTON = 30
-_SHARPEST = 0.01
+_SHARPEST = 0.003
 _FLOOR = 1e-3
 _REJECTIONS = 4
 _ATTEMPTS = 4
