@@ -16,7 +16,6 @@ import hashlib
 import io
 import json
 import zipfile
-import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -128,20 +127,13 @@ class Artefact:
         try:
             with zipfile.ZipFile(path) as archive:
                 return _read(archive, path)
+        except InputError:
+            raise
         except FileNotFoundError:
             raise InputError(f"{path}: no such file; expected a model ({SUFFIX})") from None
         except OSError as error:
             raise InputError(f"{path}: cannot be read ({error.strerror or error})") from None
-        except (
-            zipfile.BadZipFile,
-            zlib.error,
-            EOFError,
-            KeyError,
-            TypeError,
-            AttributeError,
-            NotImplementedError,
-            RuntimeError,
-        ) as error:
+        except Exception as error:  # a damaged archive makes zipfile raise nearly anything
             raise InputError(
                 f"{path}: not a model file, or damaged ({type(error).__name__}: {error})"
             ) from None

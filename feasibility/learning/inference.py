@@ -174,7 +174,10 @@ class VectorsPredictor:
         exponent -= squares[:, None]
         exponent -= self._squares
         exponent *= self._gamma
-        decision: _Array = np.exp(exponent, out=exponent) @ self._coefficients + self._intercept
+        np.exp(exponent, out=exponent)
+        # Not a matrix-vector product: that would round a row by where it stands.
+        exponent *= self._coefficients
+        decision: _Array = exponent.sum(axis=1) + self._intercept
         return decision
 
     def _predict(self, X: _Array) -> _Array:

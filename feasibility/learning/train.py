@@ -172,13 +172,6 @@ def train(
     X, y = scaler.transform(inputs[learned]), examples.y[learned]
     if recipe.balance == "adasyn":
         X, y = adasyn(X, y, streams[2])
-    epochs: list[Epoch] = []
-
-    def note(epoch: Epoch) -> None:
-        epochs.append(epoch)
-        if on_epoch is not None:
-            on_epoch(epoch)
-
     options: dict[str, Any] = {"checkpoint": checkpoint} if isinstance(model, Dnn) else {}
     model.fit(
         X,
@@ -186,7 +179,7 @@ def train(
         rng=streams[3],
         X_val=scaler.transform(inputs[validation]),
         y_val=examples.y[validation],
-        on_epoch=note,
+        on_epoch=on_epoch,
         **options,
     )
 
@@ -215,7 +208,7 @@ def train(
                 "validation": len(validation),
                 "calibration": len(calibration),
             },
-            "epochs": [_plain(epoch) for epoch in epochs],
+            "epochs": [_plain(epoch) for epoch in model.history] if isinstance(model, Dnn) else [],
         },
         metrics={
             "validation": summary(examples.y[validation], score["validation"]),

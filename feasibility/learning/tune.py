@@ -139,7 +139,7 @@ def tune(task: Task, storage: Path, *, n_trials: int = N_TRIALS, workers: int = 
             trial.state.name.lower(),
             trial.value if trial.state is states.COMPLETE else float("nan"),
             trial.duration.total_seconds(),
-            {**task.fixed, **trial.params},
+            {**trial.params, **task.fixed},
         )
         for trial in study.get_trials()
         if trial.state.is_finished()
@@ -166,28 +166,22 @@ def _open(optuna: Any, task: Task, storage: Path, worker: int, workers: int) -> 
             optuna.storages.journal.JournalFileBackend(str(storage))
         )
         known = [summary.study_name for summary in optuna.get_all_study_summaries(journal)]
+        if not known:
+            optuna.create_study(study_name=name, storage=journal, direction="maximize")
     except (OSError, ValueError, KeyError) as error:
         raise InputError(f"{storage}: not a journal of optuna, or damaged ({error})") from None
     if known and name not in known:
         raise InputError(f"{storage}: holds the study {known[0]!r}, expected {name!r}")
-    done = 0
-    if known:
-        done = len(optuna.load_study(study_name=name, storage=journal).trials)
-    return optuna.create_study(
-        study_name=name,
-        storage=journal,
-        direction="maximize",
-        load_if_exists=True,
-        sampler=optuna.samplers.TPESampler(
-            # Resumed, it must not draw again what it drew at first.
-            seed=int(np.random.default_rng([task.seed, worker, done]).integers(2**31)),
-            n_startup_trials=_RANDOM_TRIALS,
-            constant_liar=workers > 1,
-        ),
-        pruner=optuna.pruners.MedianPruner(
-            n_startup_trials=_WARM_UP_TRIALS, n_warmup_steps=_WARM_UP_EPOCHS
-        ),
+    study = optuna.load_study(study_name=name, storage=journal)
+    # Resumed, the sampler must not draw again what it drew at first.
+    seed = np.random.default_rng([task.seed, worker, len(study.trials)]).integers(2**31)
+    study.sampler = optuna.samplers.TPESampler(
+        seed=int(seed), n_startup_trials=_RANDOM_TRIALS, constant_liar=workers > 1
     )
+    study.pruner = optuna.pruners.MedianPruner(
+        n_startup_trials=_WARM_UP_TRIALS, n_warmup_steps=_WARM_UP_EPOCHS
+    )
+    return study
 
 
 def _objective(optuna: Any, task: Task, trial: Any) -> float:

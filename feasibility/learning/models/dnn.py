@@ -102,11 +102,17 @@ class Dnn(Fitted):
     def __init__(self, **hyperparameters: Any) -> None:
         super().__init__()
         self._config = DnnConfig(**hyperparameters)
+        self._history: tuple[Epoch, ...] = ()
 
     @property
     def config(self) -> dict[str, Any]:
         """Hyperparameters."""
         return asdict(self._config)
+
+    @property
+    def history(self) -> tuple[Epoch, ...]:
+        """All epochs of the training, those before an interruption too."""
+        return self._history
 
     def fit(
         self,
@@ -166,7 +172,7 @@ class Dnn(Fitted):
         # A last batch of a few rows would make a wild step: it is shared among the others.
         n_batches = max(1, round(n / config.batch))
         for number in range(state.epoch + 1, config.epochs + 1):
-            if config.patience is not None and number - 1 - state.best_epoch > config.patience:
+            if config.patience is not None and number - 1 - state.best_epoch >= config.patience:
                 break
             began = time.perf_counter()
             for group in optimiser.param_groups:
@@ -205,6 +211,7 @@ class Dnn(Fitted):
                 except StopTraining:
                     break
         network.load_state_dict(state.best_weights)
+        self._history = tuple(state.history)
         self._keep(_arrays(network, config))
         return self
 

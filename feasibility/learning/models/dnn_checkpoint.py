@@ -3,6 +3,7 @@
 import hashlib
 import json
 import math
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, final
 
@@ -28,6 +29,8 @@ class TrainingState:
         The one with the lowest validation loss, 0 without validation.
     best_weights : dict
         Weights to keep, of that epoch or of the last one.
+    history : list of Epoch
+        All epochs done, those before an interruption too.
     """
 
     def __init__(self, network: Any, optimiser: Any, identity: str) -> None:
@@ -38,10 +41,12 @@ class TrainingState:
         self.best_epoch = 0
         self.best_loss = math.inf
         self.best_weights = _copy(network)
+        self.history: list[Epoch] = []
 
     def record(self, epoch: Epoch, *, keep_best: bool) -> None:
         """Take note of an epoch: the best so far, or simply the last one."""
         self.epoch = epoch.number
+        self.history.append(epoch)
         better = epoch.validation_loss < self.best_loss
         if better:
             self.best_epoch = epoch.number
@@ -57,6 +62,7 @@ class TrainingState:
             "best_epoch": self.best_epoch,
             "best_loss": self.best_loss,
             "best_weights": self.best_weights,
+            "history": [asdict(epoch) for epoch in self.history],
             "network": self.network.state_dict(),
             "optimiser": self.optimiser.state_dict(),
         }
@@ -90,6 +96,7 @@ class TrainingState:
         self.best_epoch = content["best_epoch"]
         self.best_loss = content["best_loss"]
         self.best_weights = content["best_weights"]
+        self.history = [Epoch(**epoch) for epoch in content["history"]]
 
 
 def training_identity(
