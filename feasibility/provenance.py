@@ -8,7 +8,18 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-_PACKAGES = ("seqsearch", "numpy", "scipy", "numba", "pykep", "pygmo", "networkx")
+_LIBRARIES = ("numpy", "scipy", "numba", "pykep", "pygmo", "networkx", "pyarrow", "torch")
+_PACKAGES = ("seqsearch", *_LIBRARIES)
+    "seqsearch",
+    "numpy",
+    "scipy",
+    "numba",
+    "pykep",
+    "pygmo",
+    "networkx",
+    "pyarrow",
+    "torch",
+)
 
 
 def provenance() -> dict[str, Any]:

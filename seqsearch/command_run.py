@@ -1,18 +1,13 @@
 """What ``seqsearch run`` does: read, check, search, write, report."""
 
-import multiprocessing
 import os
-import signal
-import sys
-from collections.abc import Iterator
-from concurrent.futures import Executor, ProcessPoolExecutor
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from feasibility import InputError
+from feasibility.workers import worker_pool
 from seqsearch.beam import search
 from seqsearch.config import build_problem, override, read_config, with_catalogue
 from seqsearch.counters import RankCounters
@@ -81,25 +76,6 @@ def run_search(
     print(f"{result.tour.summary()}; search {result.stopped}")
     print(f"check it with: seqsearch verify {folder.path}")
     return 0
-
-
-@contextmanager
-def worker_pool(workers: int) -> Iterator[Executor | None]:
-    """Yield a process pool whose workers leave Ctrl-C to this process; None for one worker."""
-    if workers == 1:
-        yield None
-        return
-    # Workers start from a clean process: forking one that has loaded threaded libraries can hang.
-    context = multiprocessing.get_context("forkserver" if sys.platform != "win32" else "spawn")
-    pool = ProcessPoolExecutor(workers, mp_context=context, initializer=_ignore_interrupts)
-    try:
-        yield pool
-    finally:
-        pool.shutdown(wait=True, cancel_futures=True)
-
-
-def _ignore_interrupts() -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def _rank_line(counters: RankCounters, tour: Tour) -> str:

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from feasibility import AllOf, KeepAll, Mima2Pruner
+from feasibility.workers import worker_pool
 from seqsearch import TimePropellantRanking, search
-from seqsearch.command_run import worker_pool
 from seqsearch.ranking import Ranking
 from tests.problems import small_problem, small_settings
 
