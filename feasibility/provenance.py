@@ -10,16 +10,6 @@ from typing import Any
 
 _LIBRARIES = ("numpy", "scipy", "numba", "pykep", "pygmo", "networkx", "pyarrow", "torch")
 _PACKAGES = ("seqsearch", *_LIBRARIES)
-    "seqsearch",
-    "numpy",
-    "scipy",
-    "numba",
-    "pykep",
-    "pygmo",
-    "networkx",
-    "pyarrow",
-    "torch",
-)
 
 
 def provenance() -> dict[str, Any]:
