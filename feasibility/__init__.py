@@ -11,8 +11,10 @@ from feasibility.errors import InputError, MissingDependencyError
 from feasibility.legs import Legs, Spacecraft
 
 if TYPE_CHECKING:
+    from feasibility.classifier import FeasibilityClassifier
     from feasibility.pruners import (
         AllOf,
+        ClassifierPruner,
         KeepAll,
         LambertPruner,
         Mima2Pruner,
@@ -26,6 +28,8 @@ __version__ = "0.1.0"
 
 _HOMES = {
     "AllOf": "feasibility.pruners",
+    "ClassifierPruner": "feasibility.pruners",
+    "FeasibilityClassifier": "feasibility.classifier",
     "KeepAll": "feasibility.pruners",
     "LambertPruner": "feasibility.pruners",
     "Mima2Pruner": "feasibility.pruners",
@@ -39,6 +43,8 @@ _HOMES = {
 
 __all__ = [
     "AllOf",
+    "ClassifierPruner",
+    "FeasibilityClassifier",
     "InputError",
     "KeepAll",
     "LambertPruner",

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from feasibility import InputError, Legs
-from feasibility.constants import AU, MU_SUN
+from feasibility.constants import AU, DAY_S, MU_SUN
 from feasibility.learning.features import (
     FEATURES,
     NO_ARC_DELTA_V,
@@ -13,6 +13,7 @@ from feasibility.learning.features import (
     paper_features,
 )
 from feasibility.learning.standardise import Standardiser
+from feasibility.orbits.kepler_kernels import propagate_batch
 from tests.labelled import labelled_dataset
 
 
@@ -95,6 +96,19 @@ def test_given_and_computed_columns_agree_with_the_dataset():
 def test_the_impulsive_time_of_flight_does_not_depend_on_the_mass(legs):
     heavier = legs.with_m0(2.0 * legs.m0)
     assert np.array_equal(impulsive_time_of_flight(legs), impulsive_time_of_flight(heavier))
+
+
+def test_the_impulsive_time_of_flight_is_the_same_for_every_flight_time_of_a_pair():
+    legs = labelled_dataset().legs.take(np.zeros(4, dtype=int))
+    days = np.array([100.0, 200.0, 300.0, 400.0])
+    without = impulsive_time_of_flight(legs)
+    assert len(set(without.tolist())) == 1
+    # The same body at other arrival epochs: each leg alone, and all together.
+    moved = propagate_batch(legs.rv_arr.copy(), (days - legs.tof_days) * DAY_S, MU_SUN)
+    several = Legs(legs.rv_dep, moved, days, 1500.0, 0.236, 4190.0, 1000.0, arr_id=legs.arr_id)
+    assert np.array_equal(impulsive_time_of_flight(several), without)
+    alone = [impulsive_time_of_flight(several.take([row]))[0] for row in range(4)]
+    assert alone == without.tolist()
 
 
 def test_missing_impulsive_times_alone_are_computed(legs):

@@ -201,7 +201,8 @@ def impulsive_time_of_flight(legs: Legs) -> NDArray[np.float64]:
     Parameters
     ----------
     legs : Legs
-        n legs.
+        n legs. Those from the same state to the same body (`arr_id`, not
+        negative) have the same answer, which is found once.
 
     Returns
     -------
@@ -210,6 +211,14 @@ def impulsive_time_of_flight(legs: Legs) -> NDArray[np.float64]:
     """
     from feasibility.learning.impulsive_kernels import cheapest_tof_batch
 
+    if legs.arr_id is not None and (legs.arr_id >= 0).all():
+        # A search proposes each pair with many flight times.
+        key = np.column_stack([legs.rv_dep, legs.arr_id])
+        _, some, which = np.unique(key, axis=0, return_index=True, return_inverse=True)
+        which = which.reshape(-1)
+    else:
+        some = which = np.arange(len(legs))
+    legs = legs.take(some)
     first, last, coarse, fine = _GRID_DAYS
     best: NDArray[np.float64] = cheapest_tof_batch(
         # Copies are writable, as other callers' arrays are: one compiled version serves all.
@@ -223,4 +232,5 @@ def impulsive_time_of_flight(legs: Legs) -> NDArray[np.float64]:
         IMPULSIVE_REVOLUTIONS,
         MU_SUN,
     )
-    return best / DAY_S
+    days: NDArray[np.float64] = best[which] / DAY_S
+    return days

@@ -6,6 +6,7 @@
 | `LambertPruner` | its best Lambert delta-v is within the engine's means |
 | `MimaPruner` | MIMA, a closed-form maximum initial mass, reaches its mass |
 | `Mima2Pruner` | MIMA2, the same with gravity along the arc, reaches its mass |
+| `ClassifierPruner` | a trained classifier thinks it likely enough, or does not know it |
 | `AllOf` | all its pruners keep it, cheap ones asked first |
 
 A pruner of one's own is any object with a method `keep(legs) -> (n,) bool` that
@@ -37,6 +38,7 @@ and goes wherever a pruner is asked for, also inside `AllOf`.
 
 from feasibility.pruners.all_of import AllOf, pruner_name
 from feasibility.pruners.check import PrunerContractError, check_pruner
+from feasibility.pruners.classifier import ClassifierPruner
 from feasibility.pruners.keep_all import KeepAll
 from feasibility.pruners.lambert import LambertPruner
 from feasibility.pruners.mima import MimaPruner
@@ -45,6 +47,7 @@ from feasibility.pruners.protocol import Pruner
 
 __all__ = [
     "AllOf",
+    "ClassifierPruner",
     "KeepAll",
     "LambertPruner",
     "Mima2Pruner",
