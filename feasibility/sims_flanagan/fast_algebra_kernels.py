@@ -6,11 +6,16 @@ calls at this size. Nothing is allocated, nothing validated.
 
 import math
 
+import numpy as np
+from numpy.typing import NDArray
+
 from feasibility.jit import kernel
+
+_Array = NDArray[np.float64]
 
 
 @kernel
-def cholesky(a, lower):
+def cholesky(a: _Array, lower: _Array) -> bool:
     """Write the lower Cholesky factor of the (6, 6) matrix `a`; return whether it exists."""
     for i in range(6):
         for j in range(i + 1):
@@ -27,7 +32,7 @@ def cholesky(a, lower):
 
 
 @kernel
-def solve_lower(lower, b):
+def solve_lower(lower: _Array, b: _Array) -> None:
     """Overwrite `b` (6,) with the solution of L x = b."""
     for i in range(6):
         total = b[i]
@@ -37,7 +42,7 @@ def solve_lower(lower, b):
 
 
 @kernel
-def solve_lower_transposed(lower, b):
+def solve_lower_transposed(lower: _Array, b: _Array) -> None:
     """Overwrite `b` (6,) with the solution of L^T x = b."""
     for i in range(5, -1, -1):
         total = b[i]
@@ -47,7 +52,7 @@ def solve_lower_transposed(lower, b):
 
 
 @kernel
-def multiply_lower_transposed(lower, b):
+def multiply_lower_transposed(lower: _Array, b: _Array) -> None:
     """Overwrite `b` (6,) with L^T b."""
     for i in range(6):
         total = 0.0
@@ -57,7 +62,7 @@ def multiply_lower_transposed(lower, b):
 
 
 @kernel
-def norm6(a):
+def norm6(a: _Array) -> float:
     """Return the Euclidean norm of a 6-vector."""
     total = 0.0
     for i in range(6):
@@ -66,7 +71,7 @@ def norm6(a):
 
 
 @kernel
-def divide(a, b, quotient):
+def divide(a: _Array, b: _Array, quotient: _Array) -> bool:
     """Write a b^-1 of (6, 6) matrices by Gauss elimination on rows of b^T; destroys both."""
     # Solve q b = a, column by column of b: column operations on the stacked [b; a].
     for i in range(6):

@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from feasibility.jit import kernel
 from feasibility.orbits.kepler_kernels import propagate, propagate_stm
@@ -23,12 +24,15 @@ from feasibility.sims_flanagan.fast_workspace_kernels import (
     TRIAL,
     TRIAL_GAP,
     WORK,
+    Workspace,
     X,
 )
 
+_Array = NDArray[np.float64]
+
 
 @kernel
-def shoot(x0, dv, n, dt, x):
+def shoot(x0: _Array, dv: _Array, n: int, dt: float, x: _Array) -> None:
     """Write into `x` the end of the arc from `x0` with the impulses `dv`."""
     propagate(x0, 0.5 * dt, 1.0, x)
     for i in range(n):
@@ -39,7 +43,7 @@ def shoot(x0, dv, n, dt, x):
 
 
 @kernel
-def shoot_stm(x0, dv, n, dt, x, stm):
+def shoot_stm(x0: _Array, dv: _Array, n: int, dt: float, x: _Array, stm: _Array) -> None:
     """As `shoot`; also writes the transition matrix (n, 6, 6) of each arc after an impulse."""
     propagate(x0, 0.5 * dt, 1.0, x)
     for i in range(n):
@@ -50,7 +54,9 @@ def shoot_stm(x0, dv, n, dt, x, stm):
 
 
 @kernel
-def sensitivities(stm, end_jacobian, n, b, m, m_next):
+def sensitivities(
+    stm: _Array, end_jacobian: _Array, n: int, b: _Array, m: _Array, m_next: _Array
+) -> None:
     """Write b_i (6, 3) = d(end elements)/d(dv_i) from the arcs' matrices, last arc first."""
     for i in range(6):
         for j in range(6):
@@ -70,7 +76,9 @@ def sensitivities(stm, end_jacobian, n, b, m, m_next):
 
 
 @kernel
-def linearise(x0, dv, n, dt, target, w, gap):
+def linearise(
+    x0: _Array, dv: _Array, n: int, dt: float, target: _Array, w: Workspace, gap: _Array
+) -> float:
     """Write whitened sensitivities and the whitened gap; return its norm, inf where it fails."""
     x = w.v[X]
     shoot_stm(x0, dv, n, dt, x, w.m)
@@ -86,7 +94,7 @@ def linearise(x0, dv, n, dt, target, w, gap):
 
 
 @kernel
-def subtract(b, gap, fraction, n, dv):
+def subtract(b: _Array, gap: _Array, fraction: float, n: int, dv: _Array) -> None:
     """Take a fraction of the least-norm impulses with sum b_i dv_i = gap off `dv`."""
     for i in range(n):
         for j in range(3):
@@ -97,7 +105,9 @@ def subtract(b, gap, fraction, n, dv):
 
 
 @kernel
-def whitened_gap(x0, dv, n, dt, target, w, gap):
+def whitened_gap(
+    x0: _Array, dv: _Array, n: int, dt: float, target: _Array, w: Workspace, gap: _Array
+) -> float:
     """Write the whitened gap of an arc; return its norm, inf where the end is not elliptic."""
     x = w.v[X]
     shoot(x0, dv, n, dt, x)
@@ -108,7 +118,16 @@ def whitened_gap(x0, dv, n, dt, target, w, gap):
 
 
 @kernel
-def close(x0, dv, n, dt, target, tolerance, iterations, w):
+def close(
+    x0: _Array,
+    dv: _Array,
+    n: int,
+    dt: float,
+    target: _Array,
+    tolerance: float,
+    iterations: int,
+    w: Workspace,
+) -> bool:
     """Close the arc by least-norm Gauss-Newton corrections; return whether it closed."""
     gap = w.v[GAP]
     trial_gap = w.v[TRIAL_GAP]
@@ -142,7 +161,9 @@ def close(x0, dv, n, dt, target, tolerance, iterations, w):
 
 
 @kernel
-def restore(x0, dv, n, dt, target, tolerance, w):
+def restore(
+    x0: _Array, dv: _Array, n: int, dt: float, target: _Array, tolerance: float, w: Workspace
+) -> bool:
     """As `close` with the sensitivities at hand; gives up where it does not contract."""
     gap = w.v[TRIAL_GAP]
     size = whitened_gap(x0, dv, n, dt, target, w, gap)
@@ -160,7 +181,20 @@ def restore(x0, dv, n, dt, target, tolerance, w):
 
 
 @kernel
-def improve(x0, dv, n, n_forward, dt, c, target, iterations, gain_tolerance, z_stop, lam, w):
+def improve(
+    x0: _Array,
+    dv: _Array,
+    n: int,
+    n_forward: int,
+    dt: float,
+    c: float,
+    target: _Array,
+    iterations: int,
+    gain_tolerance: float,
+    z_stop: float,
+    lam: _Array,
+    w: Workspace,
+) -> float:
     """Lower z of the closed arc `dv`; return its z (dv stays closed)."""
     gap = w.v[GAP]
     work = w.v[WORK]

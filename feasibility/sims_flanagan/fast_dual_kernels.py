@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from feasibility.jit import kernel
 from feasibility.sims_flanagan.fast_algebra_kernels import (
@@ -21,6 +22,7 @@ from feasibility.sims_flanagan.fast_workspace_kernels import (
     TRIAL_NORM,
     TRIAL_PRIMER,
     TURNED,
+    Workspace,
     Y,
 )
 
@@ -30,9 +32,11 @@ _FULL = 0.995
 _LARGEST = 2.0
 _BACKWARD_LIMIT = 0.367
 
+_Array = NDArray[np.float64]
+
 
 @kernel
-def full_thrust_profile(z, n, n_forward, y, slope):
+def full_thrust_profile(z: float, n: int, n_forward: int, y: _Array, slope: _Array) -> None:
     """Write impulses over exhaust velocity, y_i, at full thrust, and their derivative by z.
 
     z = T dt / (m0 c). Forward half (mass before the impulse): y = z_i; backward
@@ -69,7 +73,7 @@ def full_thrust_profile(z, n, n_forward, y, slope):
 
 
 @kernel
-def z_of_impulses(dv, n, n_forward, c):
+def z_of_impulses(dv: _Array, n: int, n_forward: int, c: float) -> float:
     """Return the smallest z = T dt / (m0 c) at which the impulses need no throttle above 1.
 
     m0 exp(-S_i / c) |dv_i| <= T dt with S_i the sum of the impulses before
@@ -89,7 +93,7 @@ def z_of_impulses(dv, n, n_forward, c):
 
 
 @kernel
-def whiten(b, n, gram, lower):
+def whiten(b: _Array, n: int, gram: _Array, lower: _Array) -> bool:
     """Overwrite each b_i (6, 3) with L^-1 b_i, where L L^T = sum b_i b_i^T; return whether it can.
 
     In whitened coordinates the norm of a gap is the least impulse that closes it.
@@ -115,7 +119,9 @@ def whiten(b, n, gram, lower):
 
 
 @kernel
-def _primers(b, lam, n, thrust, pinned, primer, norm):
+def _primers(
+    b: _Array, lam: _Array, n: int, thrust: _Array, pinned: _Array, primer: _Array, norm: _Array
+) -> None:
     """Write b_i^T lam and the softened norms sqrt(|b_i^T lam|^2 + eps^2).
 
     For a pinned segment the "norm" is the work done along its given direction.
@@ -142,7 +148,9 @@ def _primers(b, lam, n, thrust, pinned, primer, norm):
 
 
 @kernel
-def _bound(norm, work, z, n, n_forward, c, y, slope):
+def _bound(
+    norm: _Array, work: float, z: float, n: int, n_forward: int, c: float, y: _Array, slope: _Array
+) -> float:
     """Return the z at which full thrust along the primers just does `work`: c sum y_i |p_i|."""
     for _ in range(30):
         full_thrust_profile(z, n, n_forward, y, slope)
@@ -159,7 +167,20 @@ def _bound(norm, work, z, n, n_forward, c, y, slope):
 
 
 @kernel
-def _curvature(b, n, c, y, primer, norm, thrust, pinned, lam, h, grad, turned):
+def _curvature(
+    b: _Array,
+    n: int,
+    c: float,
+    y: _Array,
+    primer: _Array,
+    norm: _Array,
+    thrust: _Array,
+    pinned: _Array,
+    lam: _Array,
+    h: _Array,
+    grad: _Array,
+    turned: _Array,
+) -> None:
     """Add to `grad` (6,) the impulses' effect c y_i b_i p_i / |p_i|; write the Newton matrix h."""
     for i in range(6):
         for j in range(i + 1):
@@ -198,7 +219,9 @@ def _curvature(b, n, c, y, primer, norm, thrust, pinned, lam, h, grad, turned):
 
 
 @kernel
-def _climb(b, gap, n, n_forward, c, lam, z, w):
+def _climb(
+    b: _Array, gap: _Array, n: int, n_forward: int, c: float, lam: _Array, z: float, w: Workspace
+) -> float:
     """Raise z(lam) by damped Newton steps from `lam` (norm 1); return z, -1 where it fails."""
     primer, trial_primer, thrust = w.n3[PRIMER], w.n3[TRIAL_PRIMER], w.n3[THRUST]
     norm, trial_norm, y, slope = w.s[NORM], w.s[TRIAL_NORM], w.s[Y], w.s[SLOPE]
@@ -270,7 +293,9 @@ def _climb(b, gap, n, n_forward, c, lam, z, w):
 
 
 @kernel
-def _turn_thrust(b, step, fraction, primer, norm, thrust):
+def _turn_thrust(
+    b: _Array, step: _Array, fraction: float, primer: _Array, norm: float, thrust: _Array
+) -> None:
     """Let a thrust direction follow its own linearisation, kept inside the unit ball."""
     d0 = d1 = d2 = 0.0
     for i in range(6):
@@ -288,7 +313,7 @@ def _turn_thrust(b, step, fraction, primer, norm, thrust):
 
 
 @kernel
-def _pin_direction(b, lower, turned, u):
+def _pin_direction(b: _Array, lower: _Array, turned: _Array, u: _Array) -> None:
     """Move `u` (3,), shorter than 1, to the unit vector that the others make up for most cheaply.
 
     Least (v - u)^T Q (v - u) over |v| = 1 with Q = b^T H^-1 b: (Q + tau) v = Q u with
@@ -339,7 +364,18 @@ def _pin_direction(b, lower, turned, u):
 
 
 @kernel
-def least_thrust(b, gap, n, n_forward, c, lam, z, now, dv, w):
+def least_thrust(
+    b: _Array,
+    gap: _Array,
+    n: int,
+    n_forward: int,
+    c: float,
+    lam: _Array,
+    z: float,
+    now: _Array,
+    dv: _Array,
+    w: Workspace,
+) -> float:
     """Solve: least z with sum b_i dv_i = gap and |dv_i| = c y_i(z); write dv; return z or -1.
 
     The dual is the largest z(lam) over 6-vectors lam, where z(lam) solves

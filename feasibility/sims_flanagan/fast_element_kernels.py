@@ -13,21 +13,24 @@ the departure orbit.
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from feasibility.jit import kernel
 
 _TWO_PI = 2.0 * math.pi
 _STEP = 1e-5
 
+_Array = NDArray[np.float64]
+
 
 @kernel
-def wrap(angle):
+def wrap(angle: float) -> float:
     """Return the angle moved by whole turns into [-pi, pi]."""
-    return angle - _TWO_PI * np.rint(angle / _TWO_PI)
+    return angle - _TWO_PI * float(np.rint(angle / _TWO_PI))
 
 
 @kernel
-def to_elements(x, e):
+def to_elements(x: _Array, e: _Array) -> bool:
     """Write the elements (n, ex, ey, h, k, l) of the state `x`; return False if not elliptic.
 
     Equinoctial elements (Broucke and Cefola 1972) with the mean motion n in
@@ -74,7 +77,7 @@ def to_elements(x, e):
 
 
 @kernel
-def from_elements(e, x):
+def from_elements(e: _Array, x: _Array) -> None:
     """Write the state of the elements (n, ex, ey, h, k, l)."""
     ex, ey, h, k = e[1], e[2], e[3], e[4]
     f = e[5]
@@ -109,7 +112,7 @@ def from_elements(e, x):
 
 
 @kernel
-def element_gap(x, target, gap):
+def element_gap(x: _Array, target: _Array, gap: _Array) -> bool:
     """Write elements of `x` minus `target`, longitude wrapped; return False if not elliptic."""
     if not to_elements(x, gap):
         return False
@@ -120,7 +123,7 @@ def element_gap(x, target, gap):
 
 
 @kernel
-def element_derivatives(x, first, columns, scratch):
+def element_derivatives(x: _Array, first: int, columns: _Array, scratch: _Array) -> bool:
     """Write d(elements)/dx for the components `first`, ... of x; return False if not elliptic.
 
     Central differences: their error of 1e-10 only slows a Newton iteration.

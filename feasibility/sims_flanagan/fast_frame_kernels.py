@@ -2,11 +2,16 @@
 
 import math
 
+import numpy as np
+from numpy.typing import NDArray
+
 from feasibility.jit import kernel
+
+_Array = NDArray[np.float64]
 
 
 @kernel
-def rotation(x, frame):
+def rotation(x: _Array, frame: _Array) -> None:
     """Write the rows of the frame: radial, along-track, normal of the state `x`."""
     r = math.sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2])
     for i in range(3):
@@ -23,7 +28,9 @@ def rotation(x, frame):
 
 
 @kernel
-def scale_leg(rv0, rv1, mu, frame, x0, x1):
+def scale_leg(
+    rv0: _Array, rv1: _Array, mu: float, frame: _Array, x0: _Array, x1: _Array
+) -> tuple[float, float]:
     """Write the end states in the departure frame, mu = 1; return the units of length and speed.
 
     The unit of length is the departure radius. The frame makes solutions the same
@@ -43,7 +50,9 @@ def scale_leg(rv0, rv1, mu, frame, x0, x1):
 
 
 @kernel
-def write_throttles(dv, z, c, n, frame, throttles):
+def write_throttles(
+    dv: _Array, z: float, c: float, n: int, frame: _Array, throttles: _Array
+) -> float:
     """Write the throttles (n, 3) of scaled impulses, in the outer frame; return m_final / m0.
 
     A throttle is dv m / (T dt) with the mass before the impulse in the forward half,
@@ -65,7 +74,7 @@ def write_throttles(dv, z, c, n, frame, throttles):
 
 
 @kernel
-def backward_impulse(z):
+def backward_impulse(z: float) -> float:
     """Return y with y exp(-y) = z, at most 1: a backward segment's impulse over c.
 
     Beyond z = 1/e the mass convention sets a backward impulse no limit at all.
@@ -82,7 +91,9 @@ def backward_impulse(z):
 
 
 @kernel
-def read_throttles(throttles, z, c, n, frame, dv):
+def read_throttles(
+    throttles: _Array, z: float, c: float, n: int, frame: _Array, dv: _Array
+) -> None:
     """Write the scaled impulses of throttles: the inverse of `write_throttles`."""
     for i in range(n):
         size = 1e-300

@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from feasibility.jit import kernel
 from feasibility.sims_flanagan.fast_algebra_kernels import (
@@ -37,14 +38,19 @@ from feasibility.sims_flanagan.fast_workspace_kernels import (
     RESIDUAL,
     TOTAL,
     WORK,
+    Workspace,
     X,
 )
 
 _TWO_PI = 2.0 * math.pi
 
+_Array = NDArray[np.float64]
+
 
 @kernel
-def draw_path(e0, e1, tof, turns, n, shape, nodes):
+def draw_path(
+    e0: _Array, e1: _Array, tof: float, turns: int, n: int, shape: _Array, nodes: _Array
+) -> float:
     """Draw the elements before each impulse along a path with a number of turns.
 
     Linear in time, the mean motion with a parabola on top that makes the mean
@@ -74,11 +80,26 @@ def draw_path(e0, e1, tof, turns, n, shape, nodes):
         nodes[i, 5] = e0[5] + tof * (
             e0[0] * t + 0.5 * (e1[0] - e0[0]) * t * t + bump * t * t * (3.0 - 2.0 * t)
         )
-    return e0[5] + travel
+    return float(e0[5] + travel)
 
 
 @kernel
-def lifted_sweep(e0, e1, longitude, dt, n, n_forward, c, first, gentle, nodes, dv, z, lam, w):
+def lifted_sweep(
+    e0: _Array,
+    e1: _Array,
+    longitude: float,
+    dt: float,
+    n: int,
+    n_forward: int,
+    c: float,
+    first: bool,
+    gentle: bool,
+    nodes: _Array,
+    dv: _Array,
+    z: float,
+    lam: _Array,
+    w: Workspace,
+) -> tuple[float, float]:
     """Bend a path of nodes and its impulses towards a true arc of least thrust.
 
     One lifted Newton step: every node is an unknown of its own, condensed to the
@@ -202,7 +223,7 @@ def lifted_sweep(e0, e1, longitude, dt, n, n_forward, c, first, gentle, nodes, d
 
 
 @kernel
-def advance(nodes, dv, n, relax, count, w):
+def advance(nodes: _Array, dv: _Array, n: int, relax: float, count: int, w: Workspace) -> int:
     """Move nodes and impulses by Anderson's rule; return the number of steps remembered.
 
     A plain lifted step overshoots, and with it oscillates, where the dynamics bend
@@ -286,7 +307,7 @@ def advance(nodes, dv, n, relax, count, w):
 
 
 @kernel
-def inside(nodes, moved, fraction, n):
+def inside(nodes: _Array, moved: _Array, fraction: float, n: int) -> bool:
     """Tell whether the moved nodes are moderate ellipses."""
     for i in range(n):
         ex = nodes[i, 1] + fraction * moved[i, 1]

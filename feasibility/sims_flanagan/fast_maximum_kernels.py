@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from feasibility.jit import kernel
 from feasibility.sims_flanagan.fast_arc_kernels import close, improve
@@ -19,6 +20,7 @@ from feasibility.sims_flanagan.fast_workspace_kernels import (
     START_LAM,
     STARTS,
     TURN_Z,
+    Workspace,
     Z,
     make_workspace,
 )
@@ -34,15 +36,17 @@ _LOST = 1.25
 _HOPELESS = 1.03
 _LIKELY = 1.3
 
+_Array = NDArray[np.float64]
+
 
 @kernel
-def turns_of(s):
+def turns_of(s: int) -> int:
     """Return the number of whole turns of start `s`: 0, 1, -1, 2, -2 beside the nearest."""
     return (s + 1) // 2 * (1 if s % 2 else -1)
 
 
 @kernel
-def likely_turn(k, best, w):
+def likely_turn(k: int, best: float, w: Workspace) -> int:
     """Return the start number of the k-th, cyclically, of the turns not far from `best`."""
     likely = 0
     for s in range(_N_TURNS):
@@ -60,7 +64,9 @@ def likely_turn(k, best, w):
 
 
 @kernel
-def begin(s, turns, gentle, shape, tof, c, n, w):
+def begin(
+    s: int, turns: int, gentle: int, shape: _Array, tof: float, c: float, n: int, w: Workspace
+) -> None:
     """Draw path `s` and take its first lifted steps; its z goes to w.v[Z, s], inf where none.
 
     The first `gentle` steps go for the least sum of squares instead of the least thrust,
@@ -102,7 +108,7 @@ def begin(s, turns, gentle, shape, tof, c, n, w):
 
 
 @kernel
-def pursue(s, x0, tof, c, n, best, w):
+def pursue(s: int, x0: _Array, tof: float, c: float, n: int, best: float, w: Workspace) -> float:
     """Bend path `s` to a closed arc and improve it; leave it in w.n3[DV], return its z or inf."""
     nodes, start, lam = w.n6[NODES + s], w.n3[STARTS + s], w.v[START_LAM + s]
     e0, e1 = w.v[E0], w.v[E1]
@@ -134,7 +140,17 @@ def pursue(s, x0, tof, c, n, best, w):
 
 
 @kernel
-def maximum_one(x0, x1, tof, c, n, bent, shapes, w, best_dv):
+def maximum_one(
+    x0: _Array,
+    x1: _Array,
+    tof: float,
+    c: float,
+    n: int,
+    bent: _Array,
+    shapes: _Array,
+    w: Workspace,
+    best_dv: _Array,
+) -> tuple[float, int]:
     """Find the least z of one scaled leg.
 
     Parameters
@@ -172,7 +188,7 @@ def maximum_one(x0, x1, tof, c, n, bent, shapes, w, best_dv):
     for attempt in range(_N_TURNS + n_bent + shapes.shape[0]):
         k = attempt - _N_TURNS
         if k < 0:
-            s = np.argmin(w.v[Z, :_N_TURNS])
+            s = int(np.argmin(w.v[Z, :_N_TURNS]))
             start = s
             if not w.v[Z, s] < _SCREEN * best:
                 continue
@@ -197,7 +213,20 @@ def maximum_one(x0, x1, tof, c, n, bent, shapes, w, best_dv):
 
 
 @kernel
-def maximum_batch(rv0, rv1, tof, c, n, mu, bent, shapes, throttles, z_out, winner, mass_ratio):
+def maximum_batch(
+    rv0: _Array,
+    rv1: _Array,
+    tof: _Array,
+    c: _Array,
+    n: int,
+    mu: float,
+    bent: _Array,
+    shapes: _Array,
+    throttles: _Array,
+    z_out: _Array,
+    winner: NDArray[np.int64],
+    mass_ratio: _Array,
+) -> None:
     """Solve every leg of a batch, SI units; rows without a solution keep z = inf, winner = -1.
 
     Parameters

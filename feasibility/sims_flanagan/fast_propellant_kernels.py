@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from feasibility.jit import kernel
 from feasibility.sims_flanagan.fast_algebra_kernels import (
@@ -40,6 +41,7 @@ from feasibility.sims_flanagan.fast_workspace_kernels import (
     TRIAL_GAP,
     TRIAL_LAM,
     WORK,
+    Workspace,
     make_workspace,
 )
 
@@ -52,9 +54,11 @@ _ATTEMPTS = 4
 _CORRECTIONS = 8
 _CLOSED = 1e-11
 
+_Array = NDArray[np.float64]
+
 
 @kernel
-def clip_to_thrust(dv, n, n_forward, c, z, cap):
+def clip_to_thrust(dv: _Array, n: int, n_forward: int, c: float, z: float, cap: _Array) -> float:
     """Shorten impulses to full thrust, masses followed from z = T dt / (m0 c); write the bounds.
 
     Returns the sum of the impulses, which is what the propellant grows with.
@@ -73,7 +77,17 @@ def clip_to_thrust(dv, n, n_forward, c, z, cap):
 
 
 @kernel
-def restore_bounded(x0, dv, n, n_forward, dt, c, z, target, w):
+def restore_bounded(
+    x0: _Array,
+    dv: _Array,
+    n: int,
+    n_forward: int,
+    dt: float,
+    c: float,
+    z: float,
+    target: _Array,
+    w: Workspace,
+) -> bool:
     """Close an arc without exceeding full thrust, by the segments that thrust; return whether.
 
     Corrections are weighted by the thrust; a segment at full thrust only turns. The
@@ -88,7 +102,17 @@ def restore_bounded(x0, dv, n, n_forward, dt, c, z, target, w):
 
 
 @kernel
-def _correct_bounded(x0, dv, n, n_forward, dt, c, z, target, w):
+def _correct_bounded(
+    x0: _Array,
+    dv: _Array,
+    n: int,
+    n_forward: int,
+    dt: float,
+    c: float,
+    z: float,
+    target: _Array,
+    w: Workspace,
+) -> bool:
     """Correct with the sensitivities at hand until closed or no longer contracting."""
     b, gap, cap = w.b[0], w.v[TRIAL_GAP], w.s[CAP]
     gram, lower = w.m[M_ONE], w.m[M_TWO]
@@ -144,7 +168,17 @@ def _correct_bounded(x0, dv, n, n_forward, dt, c, z, target, w):
 
 
 @kernel
-def _dual_value(b, total, lam, n, cap, threshold, sharpness, primer, norm):
+def _dual_value(
+    b: _Array,
+    total: _Array,
+    lam: _Array,
+    n: int,
+    cap: _Array,
+    threshold: _Array,
+    sharpness: float,
+    primer: _Array,
+    norm: _Array,
+) -> float:
     """Write the primers; return lam . total - sum of the softened dual terms."""
     value = 0.0
     for i in range(6):
@@ -164,7 +198,9 @@ def _dual_value(b, total, lam, n, cap, threshold, sharpness, primer, norm):
 
 
 @kernel
-def least_propellant(b, total, lam, n, sharpness, linear, w):
+def least_propellant(
+    b: _Array, total: _Array, lam: _Array, n: int, sharpness: float, linear: _Array, w: Workspace
+) -> None:
     """Solve: least sum |dv_i| with sum b_i dv_i = total and |dv_i| <= cap_i; write linear.
 
     The dual in lam (6,) is lam . total - sum cap_i max(0, |b_i^T lam| - threshold_i):
@@ -243,7 +279,9 @@ def least_propellant(b, total, lam, n, sharpness, linear, w):
 
 
 @kernel
-def set_thresholds(linear, n, n_forward, c, norm, threshold):
+def set_thresholds(
+    linear: _Array, n: int, n_forward: int, c: float, norm: _Array, threshold: _Array
+) -> None:
     """Write the primer size at which each segment's thrust pays.
 
     1 for the propellant itself, less what the lighter spacecraft gains in later segments
@@ -261,7 +299,9 @@ def set_thresholds(linear, n, n_forward, c, norm, threshold):
 
 
 @kernel
-def minimise_one(x0, target, tof, c, z, n, dv, w):
+def minimise_one(
+    x0: _Array, target: _Array, tof: float, c: float, z: float, n: int, dv: _Array, w: Workspace
+) -> float:
     """Lower the impulses' sum of the closed, bounded arc `dv` in place; return it, inf if none."""
     dt = tof / n
     n_forward = n // 2
@@ -335,7 +375,17 @@ def minimise_one(x0, target, tof, c, z, n, dv, w):
 
 
 @kernel
-def minimum_batch(rv0, rv1, tof, c, z, n, mu, throttles, mass_ratio):
+def minimum_batch(
+    rv0: _Array,
+    rv1: _Array,
+    tof: _Array,
+    c: _Array,
+    z: _Array,
+    n: int,
+    mu: float,
+    throttles: _Array,
+    mass_ratio: _Array,
+) -> None:
     """Lower the propellant of every leg of a batch, SI units.
 
     Parameters

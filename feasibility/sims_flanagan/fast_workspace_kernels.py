@@ -48,7 +48,7 @@ class Workspace(NamedTuple):
 
 
 @kernel
-def make_workspace(n):
+def make_workspace(n: int) -> Workspace:
     """Allocate a `Workspace` for legs of n segments."""
     return Workspace(
         np.zeros((STARTS + N_STARTS, n, 3)),
