@@ -11,7 +11,7 @@ import numpy as np
 
 from feasibility import Legs, Mima2Pruner, Spacecraft, max_initial_mass, optimise
 from feasibility.constants import mjd_to_mjd2000
-from feasibility.orbits import OrbitalNeighbours, synthetic_main_belt
+from feasibility.orbits import OrbitalNeighbours, orbital_metric, synthetic_main_belt
 
 CRAFT = Spacecraft(m_dry=800.0, thrust=0.3, isp=3000.0)
 TOF_DAYS = np.arange(90.0, 241.0, 15.0)
@@ -28,7 +28,10 @@ def main() -> None:
     belt = synthetic_main_belt(options.bodies, np.random.default_rng(1))
     neighbours = OrbitalNeighbours(belt)
     pruner = Mima2Pruner()
-    here, epoch, mass = 0, mjd_to_mjd2000(59215.0), 2000.0
+    epoch, mass = mjd_to_mjd2000(59215.0), 2000.0
+    points = orbital_metric(belt.states(epoch), 180.0)
+    eighth = neighbours.query(np.arange(len(belt)), epoch, 8)[:, -1]
+    here = int(np.argmin(np.linalg.norm(points - points[eighth], axis=1)))  # where it is crowded
     visited = [here]
     for _ in range(options.legs):
         near = neighbours.query([here], [epoch], 100)[0]

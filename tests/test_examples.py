@@ -14,7 +14,7 @@ EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
     [
         ("search_demo.py", ["--bodies", "1500", "--days", "500", "--beam-width", "5"], "verified"),
         ("custom_pruner.py", ["--bodies", "1500", "--days", "400"], "keeps the contract"),
-        ("custom_search.py", ["--bodies", "1500", "--legs", "2"], "optimised"),
+        ("custom_search.py", ["--legs", "2"], "flyable\n  S"),
     ],
 )
 def test_example(script, arguments, promise):
