@@ -27,6 +27,9 @@ writes its tables (CSV, Markdown) and figures (PNG, SVG) to DIR/NAME, and
 report.md gathers them. What was computed is kept in DIR/cells: the same
 command goes on where an interrupted one stopped, and repeats nothing.
 
+A preset of your own is a TOML file: base = "laptop" and what differs, such as
+legs = 120000 or a table [data_size] with dnn1 = [1000, 10000, 70000].
+
 """
 _ALL: Final = "all"
 _REPORT: Final = "report"
@@ -50,7 +53,9 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         "name", choices=tuple(about), metavar="NAME", help="an experiment, all or report"
     )
     parser.add_argument(
-        "--preset", default="quick", help=f"sizes: {', '.join(PRESETS)} (default: quick)"
+        "--preset",
+        default="quick",
+        help=f"sizes: {', '.join(PRESETS)} (default: quick), or a TOML file",
     )
     parser.add_argument(
         "--out", default="runs/study", metavar="DIR", help="folder of the study (runs/study)"

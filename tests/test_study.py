@@ -25,7 +25,7 @@ from feasibility.learning.study.context import Context
 from feasibility.learning.study.data import N_FOLDS, StudyData
 from feasibility.learning.study.data_size import learning_exponent
 from feasibility.learning.study.fit import MARGIN_EDGES, Fit, judge, run_fit
-from feasibility.learning.study.presets import MODELS, PRESETS
+from feasibility.learning.study.presets import MODELS, PRESETS, find_preset
 from feasibility.learning.study.report import BY_HAND, write_document
 from feasibility.learning.study.result import Result, Table
 from feasibility.learning.study.runner import Settings, run_study
@@ -385,6 +385,36 @@ def test_presets_ask_for_what_exists(preset):
     assert preset.n_features_folds <= N_FOLDS
     assert max(map(max, preset.data_size.values())) < preset.legs
     assert set(preset.n_features) == set(paper_values.TABLE_4)
+
+
+def test_a_preset_file_changes_what_it_names(tmp_path):
+    path = tmp_path / "evening.toml"
+    path.write_text('base = "laptop"\nlegs = 120000\n[data_size]\ndnn1 = [1000, 70000]\n')
+    preset = find_preset(str(path))
+    laptop = PRESETS["laptop"]
+    assert preset == dataclasses.replace(
+        laptop,
+        name="evening",
+        legs=120_000,
+        data_size={**laptop.data_size, "dnn1": (1000, 70_000)},
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("legs = ", "not valid TOML"),
+        ("leg = 5", "unknown key 'leg'"),
+        ('base = "huge"', "expected one of quick"),
+        ('legs = "many"', "legs"),
+        ("[comparison]\ndnn1 = 1.5", "comparison"),
+    ],
+)
+def test_a_damaged_preset_file_is_named(tmp_path, text, message):
+    path = tmp_path / "mine.toml"
+    path.write_text(text)
+    with pytest.raises(InputError, match=f"mine.toml.*{message}"):
+        find_preset(str(path))
 
 
 def test_paper_values_obey_their_own_equations():

@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 _ELBOW_GAIN: Final = 0.01
 """A curve is flat from the size whose accuracy is within this of the last one's."""
 
+_LEAST_FOR_OUTLOOK: Final = 20_000
+"""Training legs from which on a curve is drawn out beyond its end."""
+
 Curves = dict[str, dict[int, list[Outcome]]]
 """Outcomes over the seeds, by model and training size."""
 
@@ -133,6 +136,8 @@ def _findings(curves: Curves) -> list[str]:
             )
             if errors[-1] <= target:
                 text += f", below the paper's {target:.4f}."
+            elif exponent > 0 and sizes[-1] < _LEAST_FOR_OUTLOOK:
+                text += ", too early in the curve to say where it ends."
             elif exponent > 0:
                 needed = (scale / target) ** (1.0 / exponent)
                 text += f"; at that pace the paper's {target:.4f} takes {needed:.2g} legs."

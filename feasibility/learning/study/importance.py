@@ -135,5 +135,6 @@ def _draw(
         error_kw={"linewidth": 0.8},
     )
     axes.tick_params(axis="y", labelsize=7)
+    axes.margins(y=0.01)
     axes.set(xlabel="share of importance")
     return figure

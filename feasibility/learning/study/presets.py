@@ -2,7 +2,10 @@
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Any, Final, final
+
+import msgspec
 
 from feasibility.errors import InputError
 
@@ -113,23 +116,23 @@ _QUICK: Final = Preset(
     test_share=0.2,
     test_rows=2000,
     epochs=12,
-    least_steps=150,
+    least_steps=100,
     data_size=_same((250, 500, 1000, 2000), "ensemble", "knn", "svm", "tree", "dnn1"),
     data_size_seeds=3,
     comparison=dict.fromkeys(MODELS, 2000),
     comparison_seeds=3,
     n_features=_TABLE_4_COUNTS,
-    n_features_rows=1500,
+    n_features_rows=1000,
     n_features_folds=2,
-    curve_rows=2000,
-    curve_seeds=3,
+    curve_rows=1500,
+    curve_seeds=2,
     feasible=dict.fromkeys((*BASELINES, "dnn1"), 400),
     ratios=(1.0, 2.0, 4.0),
     imbalance_seeds=2,
     tuning_model="dnn",
-    tuning_rows=800,
-    tuning_trials=4,
-    tuning_epochs=4,
+    tuning_rows=2000,
+    tuning_trials=6,
+    tuning_epochs=20,
     tuning_workers=2,
     ranking_seeds=3,
     label_legs=80,
@@ -167,9 +170,9 @@ _LAPTOP: Final = Preset(
     ratios=(1.0, 2.0, 3.0, 5.0),
     imbalance_seeds=2,
     tuning_model="dnn",
-    tuning_rows=10_000,
+    tuning_rows=20_000,
     tuning_trials=30,
-    tuning_epochs=8,
+    tuning_epochs=12,
     tuning_workers=2,
     ranking_seeds=5,
     label_legs=2000,
@@ -223,13 +226,35 @@ PRESETS: Final[Mapping[str, Preset]] = {
 
 
 def find_preset(name: str) -> Preset:
-    """Return a preset.
+    """Return a preset by name, or read one from a TOML file.
+
+    A file names the preset it starts from as ``base`` and sets what differs; a
+    table such as ``[data_size]`` changes the models it names.
 
     Raises
     ------
     InputError
-        No preset has that name.
+        No preset or file has that name, or the file has an unknown key or a wrong value.
     """
-    if name not in PRESETS:
-        raise InputError(f"--preset {name}: expected one of {', '.join(PRESETS)}")
-    return PRESETS[name]
+    if name in PRESETS:
+        return PRESETS[name]
+    path = Path(name)
+    if not path.is_file():
+        raise InputError(f"--preset {name}: expected one of {', '.join(PRESETS)}, or a TOML file")
+    try:
+        given = msgspec.toml.decode(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path}: not valid TOML ({error})") from None
+    base = given.pop("base", "quick")
+    if base not in PRESETS:
+        raise InputError(f"{path}: base = {base!r}, expected one of {', '.join(PRESETS)}")
+    settings = {**PRESETS[base].to_dict(), "name": path.stem}
+    for key, value in given.items():
+        if key not in settings or key == "name":
+            raise InputError(f"{path}: unknown key {key!r}; known keys are {', '.join(settings)}")
+        known = settings[key]
+        settings[key] = {**known, **value} if isinstance(known, dict) else value
+    try:
+        return msgspec.convert(settings, Preset, strict=False)
+    except msgspec.ValidationError as error:
+        raise InputError(f"{path}: {error}") from None

@@ -115,8 +115,9 @@ def command(record: dict[str, Any]) -> str:
 
 def _what_was_run(record: dict[str, Any]) -> str:
     data, machine, origin = record["data"], record["machine"], record["provenance"]
+    known = {**origin["versions"], **record["training_versions"]}
     versions = ", ".join(
-        f"{name} {origin['versions'][name]}" for name in _VERSIONS if origin["versions"].get(name)
+        f"{name} {known[name]}" for name in (*_VERSIONS, *record["training_versions"])
     )
     experiments = record["experiments"]
     total = sum(entry["seconds"] for entry in experiments.values())

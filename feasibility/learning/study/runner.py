@@ -2,9 +2,11 @@
 
 import importlib
 import json
+import os
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from importlib import metadata
 from pathlib import Path
 from typing import Any, Final, final
 
@@ -22,6 +24,8 @@ from feasibility.learning.study.presets import Preset
 from feasibility.learning.study.result import Result
 from feasibility.provenance import provenance
 from feasibility.workers import worker_pool
+
+_TRAINING: Final = ("torch", "scikit-learn", "imbalanced-learn", "optuna")
 
 RECORD: Final = "study.json"
 """File of a study's folder that says what was run."""
@@ -228,6 +232,7 @@ def _open_record(settings: Settings, data: StudyData) -> dict[str, Any]:
         "threads": settings.threads,
         "device": settings.device,
         "provenance": provenance(),
+        "training_versions": {name: metadata.version(name) for name in _TRAINING},
         "machine": machine(),
         "experiments": {},
     }
@@ -241,8 +246,6 @@ def _write_record(out: Path, record: dict[str, Any]) -> None:
 
 def machine() -> dict[str, Any]:
     """Return the processor's name, its cores and the memory in GiB, as far as they can be had."""
-    import os
-
     name, memory_gib = "", None
     cpuinfo, meminfo = Path("/proc/cpuinfo"), Path("/proc/meminfo")
     if cpuinfo.exists():
