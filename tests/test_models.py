@@ -75,6 +75,7 @@ def libraries_probability(model):
     from sklearn.neighbors import KNeighborsClassifier
     from sklearn.svm import SVC
     from sklearn.tree import DecisionTreeClassifier
+    from threadpoolctl import threadpool_limits
 
     arrays = model.to_arrays()
     rng = np.random.default_rng(1)
@@ -109,7 +110,9 @@ def libraries_probability(model):
         ),
     }[model.kind]()
     single = X.astype(np.float32) if model.kind == "ensemble" else X
-    return estimator.fit(single[TRAIN], Y[TRAIN]).predict_proba(single[TEST])[:, 1]
+    # Beside other work, threads that wait for each other make this test ten times slower.
+    with threadpool_limits(1):
+        return estimator.fit(single[TRAIN], Y[TRAIN]).predict_proba(single[TEST])[:, 1]
 
 
 def test_arrays_predict_what_the_library_predicts(model):
