@@ -43,8 +43,8 @@ def run(context: Context) -> Result:
             f"estimator, poor trials ended early), each {preset.tuning_epochs} epochs on "
             f"{len(task.y)} balanced legs of four folds; the objective is the accuracy on a "
             f"balanced draw of the fifth, {len(task.y_val)} legs. Every trial has one thread, so "
-            "that the times compare processes; starting the processes counts. The paper's hours are "
-            "of its own machines and sizes: only the ratio compares."
+            "that the times compare processes; starting the processes counts. The paper's hours "
+            "are of its own machines and sizes: only the ratio compares."
         ),
         findings=tuple(_findings(runs, table_5)),
         tables=(_time_table(runs, table_5), _best_table(runs), _trial_table(runs)),
