@@ -9,6 +9,7 @@ from feasibility.jit import kernel
 from feasibility.sims_flanagan.fast_algebra_kernels import (
     cholesky,
     multiply_lower_transposed,
+    norm6,
     solve_lower,
     solve_lower_transposed,
 )
@@ -51,6 +52,7 @@ _SHARPEST = 0.003
 _FLOOR = 1e-3
 _REJECTIONS = 4
 _ATTEMPTS = 4
+_MISSING = 1e-2
 _CORRECTIONS = 8
 _CLOSED = 1e-11
 
@@ -200,12 +202,13 @@ def _dual_value(
 @kernel
 def least_propellant(
     b: _Array, total: _Array, lam: _Array, n: int, sharpness: float, linear: _Array, w: Workspace
-) -> None:
+) -> float:
     """Solve: least sum |dv_i| with sum b_i dv_i = total and |dv_i| <= cap_i; write linear.
 
     The dual in lam (6,) is lam . total - sum cap_i max(0, |b_i^T lam| - threshold_i):
     thrust where the primer exceeds the threshold. The maximum is softened to
     sharpness * log(1 + exp(./sharpness)), and damped Newton steps are taken on lam.
+    Returns the part of `total` that is missing.
     """
     primer, norm, cap, threshold = w.n3[PRIMER], w.s[NORM], w.s[CAP], w.s[THRESHOLD]
     h, lower, step, trial = w.m[HESSIAN], w.m[HESSIAN_LOWER], w.v[STEP], w.v[TRIAL_LAM]
@@ -276,6 +279,14 @@ def least_propellant(
         scale = cap[k] / (1.0 + math.exp(-min(max(u, -500.0), 500.0))) / norm[k]
         for j in range(3):
             linear[k, j] = scale * primer[k, j]
+    missing = 0.0
+    for i in range(6):
+        gap = -total[i]
+        for k in range(n):
+            for j in range(3):
+                gap += b[k, i, j] * linear[k, j]
+        missing += gap * gap
+    return math.sqrt(missing) / norm6(total)
 
 
 @kernel
@@ -291,7 +302,7 @@ def set_thresholds(
     for i in range(n - 1, -1, -1):
         y = math.sqrt(linear[i, 0] ** 2 + linear[i, 1] ** 2 + linear[i, 2] ** 2) / c
         excess = max(norm[i] - threshold[i], 0.0)
-        threshold[i] = max(1.0 - gained, 0.05)
+        threshold[i] = 0.5 * (threshold[i] + max(1.0 - gained, 0.05))
         if i < n_forward:
             gained += excess * y
         else:
@@ -332,8 +343,19 @@ def minimise_one(
         # lam lives in element coordinates between linearisations.
         multiply_lower_transposed(w.m[LOWER], lam)
         clip_to_thrust(dv, n, n_forward, c, z, cap)
-        least_propellant(b, total, lam, n, sharpness, linear, w)
+        missing = least_propellant(b, total, lam, n, sharpness, linear, w)
         solve_lower_transposed(w.m[LOWER], lam)
+        if not missing < _MISSING:
+            # Lost in the saturated range: begin again, softly.
+            rejected += 1
+            if rejected >= _REJECTIONS:
+                break
+            for i in range(n):
+                threshold[i] = 1.0
+            for i in range(6):
+                lam[i] = 0.0
+            sharpness = 0.3
+            continue
         set_thresholds(linear, n, n_forward, c, norm, threshold)
         predicted = 0.0
         for i in range(n):
@@ -367,7 +389,7 @@ def minimise_one(
         else:
             # A softer answer moves less abruptly where thrust switches on and off.
             rejected += 1
-            if rejected == _REJECTIONS:
+            if rejected >= _REJECTIONS:
                 break
             fraction = 1.0
             sharpness = min(10.0 * sharpness, 0.3)
