@@ -13,6 +13,7 @@ from typing import Any
 from feasibility.dataset.generate import Generation, begin
 from feasibility.dataset.protocol import read_protocol
 from feasibility.errors import InputError, MissingDependencyError
+from feasibility.sims_flanagan.prepare import compile_kernels
 from feasibility.workers import worker_pool
 
 
@@ -107,6 +108,7 @@ def _unfinished(what: str, done: int, legs: int) -> str:
 def _executor(workers: int, scheduler: str | None) -> Iterator[tuple[Executor | None, int]]:
     """Yield the executor and how many shards to have at work on it."""
     if scheduler is None:
+        compile_kernels()
         with worker_pool(max(workers, 1)) as pool:
             yield pool, 2 * workers
         return

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from feasibility import InputError
+from feasibility.sims_flanagan.prepare import compile_kernels
 from feasibility.workers import worker_pool
 from seqsearch.beam import search
 from seqsearch.config import build_problem, override, read_config, with_catalogue
@@ -57,6 +58,8 @@ def run_search(
         folder.write(tour, records)
         print(_rank_line(counters, tour), flush=True)
 
+    if config.search.solver == "fast":
+        compile_kernels()
     with worker_pool(workers or os.cpu_count() or 1) as executor:
         result = search(
             problem,
