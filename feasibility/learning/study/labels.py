@@ -243,12 +243,18 @@ def _findings(
     disagree: float,
     scores: Scores,
 ) -> list[str]:
+    missed = int((flyable & ~starts[:, 0]).sum())
+    invented = int((~flyable & starts[:, 0]).sum())
     findings = [
         f"{starts[flyable].mean():.0%} of the random starts on flyable legs converge, and two "
         f"starts on the same leg disagree for {disagree:.1%} of all legs. With p the chance that "
         "a leg converges, they disagree with 2 p (1 - p), and even a classifier that knows p errs "
         f"with min(p, 1 - p): between {disagree / 2:.1%} and {disagree:.1%} of error on this "
         "label is luck of the start, whatever the model.",
+        f"The label of the first start is wrong about flyability for {missed + invented} of "
+        f"{len(flyable)} legs: {missed} flyable ones that the solver did not close, {invented} "
+        "the other way round. What of this is not luck can be learned, and a search pruned by "
+        "such a model loses those legs however well it is learned.",
     ]
     for model in dict.fromkeys(key[0] for key in scores):
         means = {
