@@ -54,8 +54,8 @@ class SearchSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
         Beams run one after another, each with starts of its own.
     """
 
-    beam_width: _Count = 100
-    starts: _Count = 200
+    beam_width: _Count = 200
+    starts: _Count = 300
     start_epochs: _Count = 40
     neighbours: _Count = 60
     reference_tof_days: _Positive = 180.0
