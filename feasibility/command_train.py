@@ -17,12 +17,16 @@ first of them taken, standardised, the classes balanced if asked for. A network
 writes a checkpoint after each epoch beside the model; run the command again to
 go on after an interruption.
 
+The model "margin" learns the maximum initial mass instead, for any spacecraft, from one or
+more datasets; the learning curve is drawn beside it.
+
+  feasibility train data/search data/table1 data/general --model margin --out any.seqmodel
   feasibility train data/table1 --preset dnn1 --out dnn1.seqmodel
   feasibility train data/table1 --model ensemble --balance adasyn
   seqsearch run gtoc7 --pruner dnn1.seqmodel:0.99
 """
 
-_MODELS: Final = ("dnn", "ensemble", "knn", "svm", "tree")
+_MODELS: Final = ("margin", "dnn", "ensemble", "knn", "svm", "tree")
 _DEFAULT_FEATURES: Final = 60
 
 
@@ -34,7 +38,9 @@ def add_parser(commands: Any) -> None:
         description=_DESCRIPTION,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("dataset", metavar="DATASET", help="folder of a dataset")
+    parser.add_argument(
+        "dataset", nargs="+", metavar="DATASET", help="folder of a dataset; several for margin"
+    )
     parser.add_argument("--model", choices=_MODELS, help="kind of model (default: dnn)")
     parser.add_argument(
         "--preset",
@@ -88,7 +94,62 @@ def run(options: argparse.Namespace) -> int:
     out = Path(options.out or f"{name}.seqmodel")
     if not out.parent.is_dir():
         raise InputError(f"--out {out}: no folder {out.parent}")
+    if name == "margin":
+        return _train_margin(options, out)
+    if len(options.dataset) > 1:
+        raise InputError(f"{len(options.dataset)} datasets: only --model margin takes several")
     return _train(options, name, out)
+
+
+def _train_margin(options: argparse.Namespace, out: Path) -> int:
+    from feasibility.dataset import read_dataset
+    from feasibility.learning.margin.curves import draw_learning_curve
+    from feasibility.learning.margin.train import MarginRecipe, train_margin
+
+    for name in ("preset", "features"):
+        if getattr(options, name) is not None:
+            raise InputError(f"--{name}: is not for --model margin")
+    if options.balance != "none":
+        raise InputError("--balance: is not for --model margin, which learns masses, not classes")
+    settings = _hyperparameters(options, network=True)
+    settings.pop("keep_best", None)
+    try:
+        recipe = MarginRecipe(**settings, seed=options.seed)
+    except TypeError as error:
+        raise InputError(f"--set: {error}") from None
+    checkpoint = out.with_name(out.name + ".checkpoint")
+    artefact = train_margin(
+        [read_dataset(folder) for folder in options.dataset],
+        recipe,
+        checkpoint=checkpoint,
+        on_epoch=_print_margin_epoch,
+    )
+    artefact.save(out)
+    checkpoint.unlink(missing_ok=True)
+    curve = out.with_suffix(".png")
+    draw_learning_curve(artefact, curve)
+    legs = artefact.config["legs"]
+    print(
+        f"{legs['training']} legs for training, {legs['validation']} for validation, "
+        f"{legs['calibration']} for calibration"
+    )
+    measures = artefact.metrics["calibration"]
+    print(
+        "calibration legs: error of log m*, median "
+        f"{measures['median_absolute_log_error']:.5f}, mean "
+        f"{measures['mean_absolute_log_error']:.5f} (hint alone: median "
+        f"{measures['hint_median_absolute_log_error']:.5f})"
+    )
+    print(f"wrote {out} and {curve}")
+    return 0
+
+
+def _print_margin_epoch(epoch: Any) -> None:
+    print(
+        f"epoch {epoch.number:>3}: training loss {epoch.train_loss:.5f}, "
+        f"validation loss {epoch.validation_loss:.5f}",
+        flush=True,
+    )
 
 
 def _train(options: argparse.Namespace, name: str, out: Path) -> int:
@@ -108,7 +169,7 @@ def _train(options: argparse.Namespace, name: str, out: Path) -> int:
     )
     checkpoint = out.with_name(out.name + ".checkpoint")
     artefact = train(
-        read_dataset(options.dataset), recipe, checkpoint=checkpoint, on_epoch=_print_epoch
+        read_dataset(options.dataset[0]), recipe, checkpoint=checkpoint, on_epoch=_print_epoch
     )
     artefact.save(out)
     checkpoint.unlink(missing_ok=True)

@@ -1,0 +1,122 @@
+"""`MarginEstimator`: a trained margin model, asked about legs; needs no torch."""
+
+from typing import Final, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.errors import InputError
+from feasibility.learning.artefact import Artefact
+from feasibility.learning.margin.calibration import CERTAIN, Calibration
+from feasibility.learning.margin.features import (
+    FEATURE_SET,
+    FEATURES,
+    domain_quantities,
+    log_acceleration,
+    margin_features,
+    quick_features,
+)
+from feasibility.learning.margin.network import MarginNet
+from feasibility.legs import Legs
+
+_Array = NDArray[np.float64]
+
+_UNKNOWN: Final = 0.5
+"""Probability where no features exist, so that nothing is known."""
+
+_LEGS_AT_A_TIME: Final = 4096
+
+
+@final
+class MarginEstimator:
+    """Estimates log(m* / m0) of legs and how likely it is to be 0 or more.
+
+    Two nets: the quick one settles legs far from the boundary, the other one looks at the
+    rest. The settled ones get the probabilities at the ends of the scale, so that a heavier
+    spacecraft is never more feasible.
+
+    Parameters
+    ----------
+    artefact : Artefact
+        A model of kind "margin".
+
+    Raises
+    ------
+    InputError
+        The artefact has other features than this version, or an array is missing.
+    """
+
+    def __init__(self, artefact: Artefact) -> None:
+        if artefact.feature_set != FEATURE_SET or artefact.features != FEATURES:
+            raise InputError(
+                f"model with features {artefact.feature_set!r}: unknown, expected {FEATURE_SET!r}"
+            )
+        quick, domain = artefact.section("quick"), artefact.section("domain")
+        try:
+            self._net = MarginNet(artefact.section("model"))
+            self._quick = MarginNet(quick)
+            self._settled_low, self._settled_high = (float(v) for v in quick["settled"])
+            self._calibration = Calibration(artefact.section("calibration"))
+            self._low, self._high = domain["low"], domain["high"]
+        except KeyError as error:
+            raise InputError(f"model: array {error} is missing") from None
+
+    def assess(self, legs: Legs) -> tuple[_Array, NDArray[np.bool_]]:
+        """Return (n,) the probabilities of feasibility and whether the legs are in the domain."""
+        n = len(legs)
+        probability = np.full(n, _UNKNOWN)
+        inside = np.zeros(n, dtype=np.bool_)
+        for first in range(0, n, _LEGS_AT_A_TIME):
+            rows = np.arange(first, min(first + _LEGS_AT_A_TIME, n))
+            part = legs.take(rows) if n > len(rows) else legs
+            probability[rows], inside[rows] = self._assess(part)
+        return probability, inside
+
+    def _assess(self, legs: Legs) -> tuple[_Array, NDArray[np.bool_]]:
+        X, hint = quick_features(legs)
+        probability = np.full(len(legs), _UNKNOWN)
+        inside = np.zeros(len(legs), dtype=np.bool_)
+        known = np.isfinite(hint)
+        rows = np.flatnonzero(known)
+        inside[rows] = self._inside(X[rows])
+        correction, error = self._quick(X[rows])
+        actual = log_acceleration(legs, legs.m0)
+        ratio = (actual[rows] - hint[rows] - correction) / error
+        feasible = ratio > -self._settled_low
+        infeasible = ratio < -self._settled_high
+        probability[rows[feasible]] = 1.0 - CERTAIN
+        probability[rows[infeasible]] = CERTAIN
+        open_rows = np.concatenate([np.flatnonzero(~known), rows[~(feasible | infeasible)]])
+        open_rows.sort()
+        if len(open_rows):
+            part = legs.take(open_rows)
+            log_margin, doubt, near = self.estimate(part)
+            found = np.isfinite(log_margin)
+            p = np.full(len(open_rows), _UNKNOWN)
+            p[found] = self._calibration.probability(log_margin[found], doubt[found])
+            probability[open_rows] = p
+            # By the quick features wherever they exist, as the mass must not decide which.
+            inside[open_rows] = np.where(known[open_rows], inside[open_rows], near)
+        return probability, inside
+
+    def estimate(self, legs: Legs) -> tuple[_Array, _Array, NDArray[np.bool_]]:
+        """Return (n,) log(m* / m0), its expected error, and whether the legs are in the domain.
+
+        NaN where no features exist.
+        """
+        X, hint = margin_features(legs)
+        log_margin = np.full(len(legs), np.nan)
+        doubt = np.full(len(legs), np.nan)
+        inside = np.zeros(len(legs), dtype=np.bool_)
+        rows = np.flatnonzero(np.isfinite(hint))
+        correction, doubt[rows] = self._net(X[rows])
+        log_margin[rows] = log_acceleration(legs, legs.m0)[rows] - hint[rows] - correction
+        inside[rows] = self._inside(X[rows])
+        return log_margin, doubt, inside
+
+    def _inside(self, X: _Array) -> NDArray[np.bool_]:
+        quantities = domain_quantities(X)
+        inside: NDArray[np.bool_] = ((self._low <= quantities) & (quantities <= self._high)).all(
+            axis=1
+        )
+        return inside
