@@ -27,7 +27,7 @@ from feasibility.sims_flanagan.solutions import (
 # in units of the departure orbit's. Large enough to reach other optima, small enough to
 # remain moderate ellipses.
 _SPREAD: Final = 0.2 / np.array([1.0, 2.0, 3.0])
-_N_BENT: Final = 3
+_N_BENT: Final = 15
 # Rounding of masses that went through a file or through units.
 _MASS_ROUNDING: Final = 1e-6
 
@@ -59,7 +59,7 @@ def fast_max_initial_mass(
     -------
     LegSolutions
         n rows. ``start`` is 0 to 4 for the nearest number of turns and 1, -1, 2, -2
-        turns beside it, 5 to 8 for bent paths, 9 for a random one, 100 and above for
+        turns beside it, 5 to 20 for bent paths, 21 for a random one, 100 and above for
         the reference's starts; ``seconds`` is the batch's time shared out evenly.
     """
     from feasibility.sims_flanagan.fast_maximum_kernels import maximum_batch

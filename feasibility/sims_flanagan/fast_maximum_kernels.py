@@ -32,6 +32,8 @@ _SCREEN = 3.0
 _RELAX = 0.5
 _GENTLE = 3
 _SHORT = math.pi
+_AGREEMENT = 5
+_SAME = 1e-3
 _STILL = 3e-3
 _LOST = 1.25
 _HOPELESS = 1.03
@@ -169,7 +171,8 @@ def maximum_batch(
     mu : float
         Gravitational parameter.
     bent : (b, 5, 3) float64
-        Path shapes to be tried besides the plain paths unless the leg is short.
+        Path shapes to be tried besides the plain paths unless the leg is short, until enough
+        starts have led to the best z.
     shapes : (legs, k, 5, 3) float64
         Path shapes to be tried on every leg.
     throttles : (legs, n, 3) float64
@@ -195,6 +198,7 @@ def maximum_batch(
         if not to_elements(x0, w.v[E0]) or not to_elements(x1, w.v[E1]):
             continue
         best = np.inf
+        agreed = 0
         for s in range(_N_TURNS):
             if lay_path(s, turns_of(s), straight, tof, n, w):
                 bend(s, _FIRST_SWEEPS, 0, tof, c, n, best, w)
@@ -203,6 +207,8 @@ def maximum_batch(
         n_bent = bent.shape[0] if w.v[LONGITUDE, 0] - w.v[E0, 5] > _SHORT else 0
         for attempt in range(_N_TURNS + n_bent + shapes.shape[1]):
             k = attempt - _N_TURNS
+            if 0 <= k < n_bent and agreed >= _AGREEMENT:
+                continue
             if k < 0:
                 s = int(np.argmin(w.v[Z, :_N_TURNS]))
                 start = s
@@ -220,6 +226,10 @@ def maximum_batch(
             w.v[Z, s] = np.inf
             if k < 0 and z < np.inf:
                 w.v[TURN_Z, s] = z
+            if z < best:
+                agreed = agreed + 1 if z > (1.0 - _SAME) * best else 1
+            elif z < (1.0 + _SAME) * best:
+                agreed += 1
             if z < best:
                 best = z
                 winner[row] = start
