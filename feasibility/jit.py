@@ -28,10 +28,10 @@ def kernel(function: _F) -> _F:
 
     The kernel works on bare arrays and numbers; it validates nothing.
     """
-    compiled = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
+    compiled: Any = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
     # Private names of numba, so absence must do no harm; test_kernel_cache would tell.
-    index = getattr(getattr(compiled, "_cache", None), "_cache_file", None)
-    if hasattr(index, "_source_stamp"):
+    index: Any = getattr(getattr(compiled, "_cache", None), "_cache_file", None)
+    if index is not None and hasattr(index, "_source_stamp"):
         index._source_stamp = (index._source_stamp, _kernel_sources_digest())
     typed: _F = compiled
     return typed
@@ -46,7 +46,7 @@ def _kernel_sources_digest() -> str:
     return digest.hexdigest()
 
 
-class _Announcer(event.Listener):  # type: ignore[misc]
+class _Announcer(event.Listener):
     """Says once that kernels are being compiled."""
 
     def __init__(self) -> None:
@@ -67,4 +67,5 @@ class _Announcer(event.Listener):  # type: ignore[misc]
         """Nothing to say at the end: the next line of output is the caller's own."""
 
 
-event.register("numba:compile", _Announcer())
+_register: Any = event.register
+_register("numba:compile", _Announcer())

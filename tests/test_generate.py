@@ -198,7 +198,9 @@ def test_ctrl_c_stops_cleanly_and_says_how_to_go_on(protocol_file, tmp_path):
         _, errors = process.communicate(timeout=60)
     assert process.returncode == 130
     assert b"Traceback" not in errors
-    assert re.search(rb"interrupted; \d+ of 590 legs are written, the same command goes on", errors)
+    assert re.search(
+        rb"interrupted; \d+ of 590 legs are written, the same command goes on", errors
+    )
     protocol = read_protocol(str(protocol_file))
     missing = begin(protocol, LEGS, folder).legs_missing
     assert missing == LEGS - 40 * len(shards(folder))
