@@ -22,6 +22,10 @@ NEAR_BOUNDARY: Final = (0.15, 0.05)
 """Legs within these shares of the boundary, by abs(m*/m0 - 1), are judged on their own."""
 
 
+NEAR_MARGIN: Final = 0.5
+"""Legs with abs(log(m*/m0)) up to this count for ``*_log_margin_error_near``."""
+
+
 @final
 @dataclass(frozen=True, eq=False)
 class Evaluation:
@@ -35,15 +39,20 @@ class Evaluation:
         The model's answers.
     metrics : dict of str to float
         `metrics.summary` at threshold 0.5, ``in_domain``, the share of legs within the
-        model's domain, and ``accuracy_within_15_percent`` and so on where margins are known.
+        model's domain, and ``accuracy_within_15_percent`` and so on where margins are known; for
+        a model that knows margins the errors of log(m*/m0).
     pruning : tuple of dict
         For each of `RECALLS`: threshold, recall met, and share of the infeasible legs pruned.
+    true_log_margin, log_margin : (n,) float64, optional
+        log(m*/m0) by the dataset and by the model, for a model that knows margins.
     """
 
     y: NDArray[np.bool_]
     probability: NDArray[np.float64]
     metrics: dict[str, float]
     pruning: tuple[dict[str, float], ...]
+    true_log_margin: NDArray[np.float64] | None = None
+    log_margin: NDArray[np.float64] | None = None
 
     def table(self) -> str:
         """Return the figures as Markdown."""
@@ -75,6 +84,9 @@ class Evaluation:
         write_text(paths[1], f"# {title}\n\n{self.table()}")
         self._plot_roc(paths[2], title)
         self._plot_reliability(paths[3], title)
+        if self.log_margin is not None and self.true_log_margin is not None:
+            paths.append(folder / "margin.png")
+            _plot_margins(self.true_log_margin, self.log_margin, paths[-1], title)
         return paths
 
     def _plot_roc(self, path: Path, title: str) -> None:
@@ -125,7 +137,19 @@ def evaluate(classifier: FeasibilityClassifier, dataset: Dataset) -> Evaluation:
         if near.any():
             right = (probability[near] >= 0.5) == y[near]
             metrics[f"accuracy_within_{100 * width:.0f}_percent"] = float(right.mean())
-    return Evaluation(y, probability, metrics, _pruning(classifier, y, probability, RECALLS))
+    pruning = _pruning(classifier, y, probability, RECALLS)
+    if classifier.artefact.kind != "margin":
+        return Evaluation(y, probability, metrics, pruning)
+    estimate = np.log(classifier.margin(part.legs))
+    error = np.abs(estimate - log_margin)[np.isfinite(estimate) & np.isfinite(log_margin)]
+    metrics["margin_known"] = float(np.isfinite(estimate).mean())
+    metrics["median_log_margin_error"] = float(np.median(error))
+    near = np.abs(log_margin) <= NEAR_MARGIN
+    error = np.abs(estimate - log_margin)[near & np.isfinite(estimate)]
+    if len(error):
+        metrics["median_log_margin_error_near"] = float(np.median(error))
+        metrics["mean_log_margin_error_near"] = float(np.mean(error))
+    return Evaluation(y, probability, metrics, pruning, log_margin, estimate)
 
 
 def _pruning(
@@ -149,8 +173,22 @@ def _pruning(
     return tuple(rows)
 
 
+def _plot_margins(
+    true: NDArray[np.float64], estimate: NDArray[np.float64], path: Path, title: str
+) -> None:
+    figure, axes = _figure(title)
+    axes.plot(true, estimate, ",", rasterized=True, label=f"{len(true)} legs")
+    axes.plot([-1, 1], [-1, 1], ":", color="grey", label="exact")
+    axes.set(
+        xlim=(-1, 1), ylim=(-1, 1), xlabel="log(m*/m0), solved", ylabel="log(m*/m0) by the model"
+    )
+    _save(figure, axes, path)
+
+
 def _number(value: float) -> str:
-    return f"{value:.0f}" if value == round(value) and abs(value) > 1 else f"{value:.4f}"
+    if value == round(value) and abs(value) > 1:
+        return f"{value:.0f}"
+    return f"{value:.4f}" if abs(value) >= 0.05 else f"{value:.5f}"
 
 
 def _figure(title: str) -> tuple[Any, Any]:

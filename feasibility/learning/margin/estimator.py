@@ -116,7 +116,5 @@ class MarginEstimator:
 
     def _inside(self, X: _Array) -> NDArray[np.bool_]:
         quantities = domain_quantities(X)
-        inside: NDArray[np.bool_] = ((self._low <= quantities) & (quantities <= self._high)).all(
-            axis=1
-        )
-        return inside
+        inside = (self._low <= quantities) & (quantities <= self._high)
+        return np.asarray(inside.all(axis=1))

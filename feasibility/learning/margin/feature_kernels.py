@@ -10,11 +10,13 @@ revolutions, of which the two cheapest are refined, and along Lambert arcs (MIMA
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from feasibility.jit import kernel
 from feasibility.learning.margin.path_kernels import (
     N_NODES,
     SATURATED,
+    PathWork,
     first_path,
     flown_path,
     gauss_row,
@@ -25,6 +27,15 @@ from feasibility.learning.margin.path_kernels import (
 from feasibility.orbits.lambert_kernels import lambert
 from feasibility.orbits.mima_kernels import mima_acceleration
 from feasibility.sims_flanagan.fast_element_kernels import from_elements, to_elements
+
+_Array = NDArray[np.float64]
+LambertWork = tuple[_Array, _Array, _Array, _Array, _Array, _Array, _Array]
+FeatureWork = tuple[
+    PathWork,
+    tuple[_Array, _Array, _Array, _Array, _Array, _Array],
+    LambertWork,
+    tuple[_Array, NDArray[np.int64], _Array, _Array, _Array, _Array],
+]
 
 N_GEOMETRY = 20
 N_NEED = 14
@@ -47,13 +58,13 @@ _LARGEST_LOG = 3.0
 
 
 @kernel
-def clip(x, low, high):
+def clip(x: float, low: float, high: float) -> float:
     """Return x within the bounds."""
     return min(max(x, low), high)
 
 
 @kernel
-def to_frame(rv_dep, rv_arr, mu, s0, s1):
+def to_frame(rv_dep: _Array, rv_arr: _Array, mu: float, s0: _Array, s1: _Array) -> float:
     """Write both states as seen from the departure orbit; return its semi-major axis in m.
 
     0 where the departure orbit is not an ellipse.
@@ -66,7 +77,7 @@ def to_frame(rv_dep, rv_arr, mu, s0, s1):
     h = math.sqrt(hx * hx + hy * hy + hz * hz)
     if not (energy * r > 1e-6 and h > 0.0):
         return 0.0
-    a = 1.0 / energy
+    a: float = 1.0 / energy
     speed = math.sqrt(mu / a)
     x, y, z = x / r, y / r, z / r
     hx, hy, hz = hx / h, hy / h, hz / h
@@ -86,7 +97,14 @@ def to_frame(rv_dep, rv_arr, mu, s0, s1):
 
 
 @kernel
-def lambert_hints(s0, s1, tof, lambert_work, out, branch):
+def lambert_hints(
+    s0: _Array,
+    s1: _Array,
+    tof: float,
+    lambert_work: LambertWork,
+    out: _Array,
+    branch: NDArray[np.int64],
+) -> None:
     """Write for 0, 1 and 2 revolutions MIMA's acceleration and the impulse sum of the best branch.
 
     SATURATED where there is none. `out` has 2 entries a number of revolutions,
@@ -117,7 +135,15 @@ def lambert_hints(s0, s1, tof, lambert_work, out, branch):
 
 
 @kernel
-def lambert_path(s0, s1, tof, ve, b, lambert_work, path_work):
+def lambert_path(
+    s0: _Array,
+    s1: _Array,
+    tof: float,
+    ve: float,
+    b: int,
+    lambert_work: LambertWork,
+    path_work: PathWork,
+) -> float:
     """Return the hint of one Lambert branch: what replaces its impulses, to first order.
 
     The path is the Lambert orbit itself, and d the effect of both impulses at arrival.
@@ -149,7 +175,7 @@ def lambert_path(s0, s1, tof, ve, b, lambert_work, path_work):
 
 
 @kernel
-def add_impulse(r, v, dv, row, d):
+def add_impulse(r: _Array, v: _Array, dv: _Array, row: _Array, d: _Array) -> None:
     """Add to d the effect of an impulse at position r[:3], velocity v (3,) of a path."""
     x, y, z = r[0], r[1], r[2]
     size = math.sqrt(x * x + y * y + z * z)
@@ -170,7 +196,17 @@ def add_impulse(r, v, dv, row, d):
 
 
 @kernel
-def geometry(s1, x0, x1, tof, ve, near, coasted, state, out):
+def geometry(
+    s1: _Array,
+    x0: _Array,
+    x1: _Array,
+    tof: float,
+    ve: float,
+    near: float,
+    coasted: _Array,
+    state: _Array,
+    out: _Array,
+) -> None:
     """Write the features 0 to N_GEOMETRY - 1: the leg, without a hint."""
     n0, n1 = x0[0], x1[0]
     out[0] = math.log(tof)
@@ -201,7 +237,7 @@ def geometry(s1, x0, x1, tof, ve, near, coasted, state, out):
 
 
 @kernel
-def need(total, tof, ve, d, p, out):
+def need(total: float, tof: float, ve: float, d: _Array, p: _Array, out: _Array) -> None:
     """Write the N_NEED features after the geometry: what has to be done, in terms of a hint.
 
     `total` is the impulse of all segments together by the hint, `p` its dual.
@@ -221,13 +257,21 @@ def need(total, tof, ve, d, p, out):
 
 
 @kernel
-def log_ratio(value, base):
+def log_ratio(value: float, base: float) -> float:
     """Return log(value) - base within what a network is shown."""
     return clip(math.log(value) - base, _LEAST_LOG, _LARGEST_LOG)
 
 
 @kernel
-def quick_features(rv_dep, rv_arr, tof_s, exhaust, mu, work, out):
+def quick_features(
+    rv_dep: _Array,
+    rv_arr: _Array,
+    tof_s: float,
+    exhaust: float,
+    mu: float,
+    work: FeatureWork,
+    out: _Array,
+) -> float:
     """Write the few features (N_QUICK,) that cost little; return the log of a rough hint.
 
     The path of the nearest number of revolutions by least squares, and MIMA.
@@ -268,19 +312,28 @@ def quick_features(rv_dep, rv_arr, tof_s, exhaust, mu, work, out):
 
 
 @kernel
-def wrapped(angle):
+def wrapped(angle: float) -> float:
     """Return the angle moved by whole turns into [-pi, pi]."""
-    return angle - _TWO_PI * np.rint(angle / _TWO_PI)
+    return float(angle - _TWO_PI * np.rint(angle / _TWO_PI))
 
 
 @kernel
-def turns_beside(q):
+def turns_beside(q: int) -> int:
     """Return the q-th number of revolutions to try, counted from the nearest one."""
     return (0, 1, -1, 2, -2)[q]
 
 
 @kernel
-def refine(x0, x1, tof, ve, excess, path_work, flown, z):
+def refine(
+    x0: _Array,
+    x1: _Array,
+    tof: float,
+    ve: float,
+    excess: float,
+    path_work: PathWork,
+    flown: _Array,
+    z: _Array,
+) -> bool:
     """Write the hints of the first path and of `_N_ROUNDS` better ones; return success.
 
     A round that fails leaves the rest at the last value.
@@ -310,7 +363,15 @@ def refine(x0, x1, tof, ve, excess, path_work, flown, z):
 
 
 @kernel
-def leg_features(rv_dep, rv_arr, tof_s, exhaust, mu, work, out):
+def leg_features(
+    rv_dep: _Array,
+    rv_arr: _Array,
+    tof_s: float,
+    exhaust: float,
+    mu: float,
+    work: FeatureWork,
+    out: _Array,
+) -> float:
     """Write the features of one leg; return the logarithm of the best hint.
 
     Parameters
@@ -434,11 +495,12 @@ def leg_features(rv_dep, rv_arr, tof_s, exhaust, mu, work, out):
         o += 4
     # On short arcs the Lambert path is the better hint.
     share = 1.0 / (1.0 + (out[13] / _SHORT_TURNS) ** 8)
-    return math.log(total / tof) + share * clip(math.log(z_lambert[0]) - base, -0.3, 0.3)
+    blend = share * clip(math.log(z_lambert[0]) - base, -0.3, 0.3)
+    return float(math.log(total / tof) + blend)
 
 
 @kernel
-def feature_workspace():
+def feature_workspace() -> FeatureWork:
     """Return the scratch arrays of `leg_features` and `quick_features`."""
     branches = 1 + 2 * MAX_REVS
     return (
@@ -465,7 +527,15 @@ def feature_workspace():
 
 
 @kernel
-def feature_batch(rv_dep, rv_arr, tof_s, exhaust, mu, out, hint):
+def feature_batch(
+    rv_dep: _Array,
+    rv_arr: _Array,
+    tof_s: _Array,
+    exhaust: _Array,
+    mu: float,
+    out: _Array,
+    hint: _Array,
+) -> None:
     """Write features (n, N_FEATURES) and log hints (n,) of n legs; see `leg_features`."""
     work = feature_workspace()
     for i in range(len(tof_s)):
@@ -473,7 +543,15 @@ def feature_batch(rv_dep, rv_arr, tof_s, exhaust, mu, out, hint):
 
 
 @kernel
-def quick_batch(rv_dep, rv_arr, tof_s, exhaust, mu, out, hint):
+def quick_batch(
+    rv_dep: _Array,
+    rv_arr: _Array,
+    tof_s: _Array,
+    exhaust: _Array,
+    mu: float,
+    out: _Array,
+    hint: _Array,
+) -> None:
     """Write features (n, N_QUICK) and log hints (n,) of n legs; see `quick_features`."""
     work = feature_workspace()
     for i in range(len(tof_s)):

@@ -28,8 +28,12 @@ Units: gravitational parameter and semi-major axis of the departure orbit are 1.
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from feasibility.jit import kernel
+
+_Array = NDArray[np.float64]
+PathWork = tuple[_Array, _Array, _Array, _Array, _Array, _Array, _Array, _Array]
 
 N_NODES = 20
 """Segments, as many as the legs have whose maximum initial mass is to be estimated."""
@@ -43,7 +47,7 @@ _LARGEST_ECCENTRICITY2 = 0.9**2
 
 
 @kernel
-def gauss_row(x, longitude, remaining, out):
+def gauss_row(x: _Array, longitude: float, remaining: float, out: _Array) -> bool:
     """Write the 13 entries of C that are not zero, for one node; return False off the ellipses.
 
     Parameters
@@ -114,7 +118,9 @@ def gauss_row(x, longitude, remaining, out):
 
 
 @kernel
-def first_path(x0, x1, tof, excess, nodes, path):
+def first_path(
+    x0: _Array, x1: _Array, tof: float, excess: float, nodes: int, path: _Array
+) -> None:
     """Write a path of elements at the nodes that leads from x0 to x1.
 
     The slow elements change linearly, but for a bump 6 s (1 - s) of the mean
@@ -131,7 +137,7 @@ def first_path(x0, x1, tof, excess, nodes, path):
 
 
 @kernel
-def gauss_rows(path, tof, nodes, rows):
+def gauss_rows(path: _Array, tof: float, nodes: int, rows: _Array) -> bool:
     """Write the rows of all nodes of a path; return False if it leaves the ellipses."""
     for i in range(nodes):
         if not gauss_row(path[i], path[i, 5], tof * (1.0 - (i + 0.5) / nodes), rows[i]):
@@ -140,7 +146,7 @@ def gauss_rows(path, tof, nodes, rows):
 
 
 @kernel
-def duals(rows, p, nodes, g):
+def duals(rows: _Array, p: _Array, nodes: int, g: _Array) -> None:
     """Write C_i^T p and its length, (4,) a node."""
     for i in range(nodes):
         c = rows[i]
@@ -154,7 +160,9 @@ def duals(rows, p, nodes, g):
 
 
 @kernel
-def weighted_solve(rows, weights, d, nodes, m, p):
+def weighted_solve(
+    rows: _Array, weights: _Array, d: _Array, nodes: int, m: _Array, p: _Array
+) -> bool:
     """Write p with (sum_i w_i C_i C_i^T) p = d; return False if the matrix is singular.
 
     Parameters
@@ -221,7 +229,7 @@ def weighted_solve(rows, weights, d, nodes, m, p):
 
 
 @kernel
-def spent_segments(i, nodes):
+def spent_segments(i: int, nodes: int) -> int:
     """Return after how many segments' propellant the mass counts for segment i.
 
     pykep's leg takes the mass before the impulse in the first half and after it in the second.
@@ -230,7 +238,9 @@ def spent_segments(i, nodes):
 
 
 @kernel
-def balanced_impulse(value, g, exhaust_velocity, nodes, c):
+def balanced_impulse(
+    value: float, g: _Array, exhaust_velocity: float, nodes: int, c: _Array
+) -> float:
     """Return z with z sum_i c_i(z) |g_i| = value, and write c_i = m_0 / m_i.
 
     m_i = m_0 (1 - z k_i / v_e) after k_i segments at full thrust, to first order in one
@@ -260,7 +270,19 @@ def balanced_impulse(value, g, exhaust_velocity, nodes, c):
 
 
 @kernel
-def smallest_impulse(rows, d, exhaust_velocity, z, nodes, steps, p, weights, g, c, m):
+def smallest_impulse(
+    rows: _Array,
+    d: _Array,
+    exhaust_velocity: float,
+    z: float,
+    nodes: int,
+    steps: int,
+    p: _Array,
+    weights: _Array,
+    g: _Array,
+    c: _Array,
+    m: _Array,
+) -> float:
     """Return z: the least impulse of the first segment with which the path can be followed.
 
     Begins with `p` and `c` of another path, from scratch where z is 0. 0 where
@@ -289,7 +311,7 @@ def smallest_impulse(rows, d, exhaust_velocity, z, nodes, steps, p, weights, g, 
 
 
 @kernel
-def reweight(g, c, nodes, weights):
+def reweight(g: _Array, c: _Array, nodes: int, weights: _Array) -> None:
     """Write weights c_i / |g_i|, bounded where a dual nearly vanishes."""
     mean = 0.0
     for i in range(nodes):
@@ -300,7 +322,9 @@ def reweight(g, c, nodes, weights):
 
 
 @kernel
-def flown_path(x0, rows, weights, g, tof, nodes, path):
+def flown_path(
+    x0: _Array, rows: _Array, weights: _Array, g: _Array, tof: float, nodes: int, path: _Array
+) -> None:
     """Write the elements at the nodes that the impulses w_i g_i lead to, half of its own each."""
     dt = tof / nodes
     n, ex, ey, h, k = x0[0], x0[1], x0[2], x0[3], x0[4]
@@ -331,7 +355,7 @@ def flown_path(x0, rows, weights, g, tof, nodes, path):
 
 
 @kernel
-def workspace():
+def workspace() -> PathWork:
     """Return scratch arrays: path, rows, p, weights, g, c, m, d."""
     return (
         np.empty((N_NODES, 6)),

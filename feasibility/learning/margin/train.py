@@ -1,6 +1,7 @@
 """From datasets to a margin model: one program, to be read from top to bottom."""
 
 import hashlib
+import itertools
 import json
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
@@ -126,7 +127,7 @@ class MarginExamples:
     ----------
     X, hint : (n, 80), (n,) float64
         `margin_features`.
-    quick_X, quick_hint : (n, 40), (n,) float64
+    X_quick, quick_hint : (n, 40), (n,) float64
         `quick_features`; the hint is NaN where there is none.
     target : (n,) float64
         `log_acceleration` at m*.
@@ -138,7 +139,7 @@ class MarginExamples:
 
     X: _Array
     hint: _Array
-    quick_X: _Array
+    X_quick: _Array
     quick_hint: _Array
     target: _Array
     weight: _Array
@@ -166,7 +167,7 @@ class MarginExamples:
             columns = dataset.columns
             legs = dataset.legs
             X, hint = margin_features(legs)
-            quick_X, quick_hint = quick_features(legs)
+            X_quick, quick_hint = quick_features(legs)
             target = log_acceleration(legs, columns["m_star_kg"])
             known = np.isfinite(target) & np.isfinite(hint)
             relevant = np.abs(columns["log_margin"]) < _RELEVANT
@@ -187,7 +188,7 @@ class MarginExamples:
                 {
                     "X": X[known],
                     "hint": hint[known],
-                    "quick_X": quick_X[known],
+                    "X_quick": X_quick[known],
                     "quick_hint": quick_hint[known],
                     "target": target[known],
                     "weight": np.where(relevant, 1.0, _FAR_WEIGHT)[known],
@@ -256,7 +257,7 @@ def train_margin(
     rough = np.isfinite(examples.quick_hint)
     quick_error = examples.target - examples.quick_hint
     quick = _fit(
-        examples.quick_X, quick_error, examples.weight, learned[rough[learned]],
+        examples.X_quick, quick_error, examples.weight, learned[rough[learned]],
         validation[rough[validation]], recipe,
         layers=_QUICK_LAYERS[0], width=_QUICK_LAYERS[1], epochs=_QUICK_EPOCHS,
     )  # fmt: skip
@@ -266,13 +267,13 @@ def train_margin(
     residual = correction - error[calibration]
     table = fit_calibration(residual, expected)
     rows = calibration[rough[calibration]]
-    quick_correction, quick_expected = MarginNet(quick)(examples.quick_X[rows])
+    quick_correction, quick_expected = MarginNet(quick)(examples.X_quick[rows])
     quick_residual = (quick_correction - quick_error[rows]) / quick_expected
     settled = _SETTLED_SAFETY * np.quantile(quick_residual, [_SETTLED_TAIL, 1.0 - _SETTLED_TAIL])
     quantities = np.concatenate(
         [
             domain_quantities(examples.X[learned]),
-            domain_quantities(examples.quick_X[learned[rough[learned]]]),
+            domain_quantities(examples.X_quick[learned[rough[learned]]]),
         ]
     )
     low, high = quantities.min(axis=0), quantities.max(axis=0)
@@ -346,13 +347,14 @@ def _fit(
     def on_device(rows: NDArray[np.intp]) -> tuple[Any, Any, Any]:
         scaled = np.clip((X[rows] - mean) / std, -INPUT_LIMIT, INPUT_LIMIT)
         values = (scaled, error[rows] / _UNIT, weight[rows])
-        return tuple(torch.from_numpy(v.astype(np.float32)).to(device) for v in values)  # type: ignore[return-value]
+        x, target, importance = (torch.from_numpy(v.astype(np.float32)) for v in values)
+        return x.to(device), target.to(device), importance.to(device)
 
     inputs, targets, weights = on_device(learned)
     held_out = on_device(validation)
     sizes = [X.shape[1], *[width] * layers]
     modules: list[Any] = []
-    for before, after in zip(sizes, sizes[1:], strict=False):
+    for before, after in itertools.pairwise(sizes):
         modules += [torch.nn.Linear(before, after), torch.nn.SiLU()]
     head = torch.nn.Linear(width, 2)
     torch.nn.init.zeros_(head.bias)
