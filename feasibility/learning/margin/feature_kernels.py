@@ -52,6 +52,7 @@ _FIRST_STEPS = 3
 _NEXT_STEPS = 2
 _DAMPING = 0.65
 _SHORT_TURNS = 0.27
+_QUICK_LEAST_MOTION = 0.3
 # Ranges of what a network can be shown.
 _LEAST_LOG = -1.5
 _LARGEST_LOG = 3.0
@@ -296,6 +297,9 @@ def quick_features(
         d[j] = x1[j] - x0[j]
     d[5] = mean + near - x0[0] * tof
     first_path(x0, x1, tof, near, QUICK_NODES, path)
+    for i in range(QUICK_NODES):
+        # Hopeless legs, far off in phase, should get a hint too: they are settled by it.
+        path[i, 0] = max(path[i, 0], _QUICK_LEAST_MOTION)
     if not gauss_rows(path, tof, QUICK_NODES, rows):
         return np.nan
     z = smallest_impulse(rows, d, ve, 0.0, QUICK_NODES, 1, p, weights, g, c, m)

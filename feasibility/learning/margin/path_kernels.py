@@ -86,7 +86,8 @@ def gauss_row(x: _Array, longitude: float, remaining: float, out: _Array) -> boo
             s, c = s - step * c - 0.5 * step * step * s, c + step * s - 0.5 * step * step * c
             break
         f -= min(1.0, max(-1.0, step))
-    a = n ** (-2.0 / 3.0)
+    root_a = 1.0 / np.cbrt(n)
+    a = root_a * root_a
     r_a = 1.0 - ex * c - ey * s
     cos_l = ((1.0 - ey * ey * b) * c + ex * ey * b * s - ex) / r_a
     sin_l = ((1.0 - ex * ex * b) * s + ex * ey * b * c - ey) / r_a

@@ -48,12 +48,15 @@ _RELEVANT: Final = 0.6
 _FAR_WEIGHT: Final = 0.25
 _QUICK_LAYERS: Final = (2, 48)
 _QUICK_EPOCHS: Final = 8
-_SETTLED_TAIL: Final = 1e-4
+_QUICK_UNIT: Final = 0.05
+_LARGEST_MISS: Final = 50.0
+_SETTLED_TAIL: Final = 3e-4
 _SETTLED_SAFETY: Final = 1.1
 _DOMAIN_SLACK: Final = 0.03
 _WEIGHT_DECAY: Final = 1e-4
 _WARM_UP: Final = 0.08
 _SIZE_WEIGHT: Final = 0.1
+_LARGEST_GRADIENT: Final = 5.0
 
 
 @final
@@ -260,6 +263,7 @@ def train_margin(
         examples.X_quick, quick_error, examples.weight, learned[rough[learned]],
         validation[rough[validation]], recipe,
         layers=_QUICK_LAYERS[0], width=_QUICK_LAYERS[1], epochs=_QUICK_EPOCHS,
+        unit=_QUICK_UNIT, heed_outliers=True,
     )  # fmt: skip
 
     # Estimates of log m* and what is wrong with them: a larger acceleration is a smaller m*.
@@ -332,10 +336,16 @@ def _fit(
     layers: int,
     width: int,
     epochs: int,
+    unit: float = _UNIT,
+    heed_outliers: bool = False,
     checkpoint: Path | None = None,
     on_epoch: OnEpoch = lambda _: None,
 ) -> dict[str, _Array]:
-    """Train one net to predict `error`, and return its arrays for `MarginNet`."""
+    """Train one net to predict `error`, and return its arrays for `MarginNet`.
+
+    Its second output is the mean absolute error to expect or, to `heed_outliers`, the root of
+    the mean square error.
+    """
     torch = load_extra("torch")
     torch.set_num_threads(recipe.threads)
     torch.manual_seed(recipe.seed)
@@ -346,7 +356,7 @@ def _fit(
 
     def on_device(rows: NDArray[np.intp]) -> tuple[Any, Any, Any]:
         scaled = np.clip((X[rows] - mean) / std, -INPUT_LIMIT, INPUT_LIMIT)
-        values = (scaled, error[rows] / _UNIT, weight[rows])
+        values = (scaled, error[rows] / unit, weight[rows])
         x, target, importance = (torch.from_numpy(v.astype(np.float32)) for v in values)
         return x.to(device), target.to(device), importance.to(device)
 
@@ -373,9 +383,13 @@ def _fit(
         x, target, importance = batch
         mean_out, scale_out = network(x).unbind(dim=1)
         loss = torch.nn.functional.smooth_l1_loss(mean_out, target, beta=0.5, reduction="none")
-        # The second output learns the size of the error (Laplace) that the first one makes.
-        miss = (mean_out - target).abs().detach()
-        size_loss = scale_out + miss * torch.exp(-scale_out)
+        # The second output learns the size of the error that the first one makes: the
+        # likelihood of a Laplace or a normal distribution.
+        miss = (mean_out - target).abs().detach().clamp(max=_LARGEST_MISS)
+        if heed_outliers:
+            size_loss = scale_out + 0.5 * miss * miss * torch.exp(-2.0 * scale_out)
+        else:
+            size_loss = scale_out + miss * torch.exp(-scale_out)
         return (importance * loss).mean(), (importance * size_loss).mean()
 
     identity = hashlib.sha256(
@@ -406,6 +420,7 @@ def _fit(
             loss, size_loss = losses_of((inputs[rows], targets[rows], weights[rows]))
             optimiser.zero_grad()
             (loss + _SIZE_WEIGHT * size_loss).backward()
+            torch.nn.utils.clip_grad_norm_(network.parameters(), _LARGEST_GRADIENT)
             optimiser.step()
             schedule.step()
             total += loss.item()
@@ -415,7 +430,7 @@ def _fit(
             state["best_loss"], state["best_epoch"] = held, number
             best = {name: value.clone() for name, value in network.state_dict().items()}
         state["epoch"] = number
-        done = MarginEpoch(number, _UNIT * total / batches, _UNIT * held)
+        done = MarginEpoch(number, unit * total / batches, unit * held)
         state["history"].append(asdict(done))
         on_epoch(done)
         if checkpoint is not None:
@@ -430,7 +445,7 @@ def _fit(
             with atomic_path(checkpoint) as temporary:
                 torch.save(content, temporary)
     network.load_state_dict(best)
-    arrays = {"mean": mean, "std": std, "unit": np.array(_UNIT)}
+    arrays = {"mean": mean, "std": std, "unit": np.array(unit)}
     for i, part in enumerate(part for part in network if hasattr(part, "weight")):
         arrays[f"weight_{i}"] = part.weight.detach().cpu().numpy().copy()
         arrays[f"bias_{i}"] = part.bias.detach().cpu().numpy().copy()
