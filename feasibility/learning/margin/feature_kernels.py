@@ -52,7 +52,9 @@ _FIRST_STEPS = 3
 _NEXT_STEPS = 2
 _DAMPING = 0.65
 _SHORT_TURNS = 0.27
-_QUICK_LEAST_MOTION = 0.3
+_LARGEST_BLEND = 2.0
+# The nearest number of revolutions always has a path; others only where it is plausible.
+_LEAST_MOTION = 0.3
 # Ranges of what a network can be shown.
 _LEAST_LOG = -1.5
 _LARGEST_LOG = 3.0
@@ -169,7 +171,7 @@ def lambert_path(
         d[j] = 0.0
     for end in range(2):
         r_end, v_end, dv = (s0, v1, dv1) if end == 0 else (s1, v2, dv2)
-        gauss_row(x, x[5] + end * x[0] * tof, (1 - end) * tof, row)
+        gauss_row(path, 0, x[5] + end * x[0] * tof, (1 - end) * tof, row)
         add_impulse(r_end, v_end[b], dv, row, d)
     z = smallest_impulse(rows, d, ve, 0.0, N_NODES, _FIRST_STEPS, p, weights, g, c, m)
     return z if 0.0 < z < SATURATED else SATURATED
@@ -188,12 +190,12 @@ def add_impulse(r: _Array, v: _Array, dv: _Array, row: _Array, d: _Array) -> Non
     u = dv[0] * x + dv[1] * y + dv[2] * z
     t = dv[0] * tx + dv[1] * ty + dv[2] * tz
     o = dv[0] * hx + dv[1] * hy + dv[2] * hz
-    d[0] += row[0] * u + row[1] * t
-    d[1] += row[2] * u + row[3] * t + row[4] * o
-    d[2] += row[5] * u + row[6] * t + row[7] * o
-    d[3] += row[8] * o
-    d[4] += row[9] * o
-    d[5] += row[10] * u + row[11] * t + row[12] * o
+    d[0] += row[0, 0] * u + row[0, 1] * t
+    d[1] += row[0, 2] * u + row[0, 3] * t + row[0, 4] * o
+    d[2] += row[0, 5] * u + row[0, 6] * t + row[0, 7] * o
+    d[3] += row[0, 8] * o
+    d[4] += row[0, 9] * o
+    d[5] += row[0, 10] * u + row[0, 11] * t + row[0, 12] * o
 
 
 @kernel
@@ -296,10 +298,7 @@ def quick_features(
     for j in range(5):
         d[j] = x1[j] - x0[j]
     d[5] = mean + near - x0[0] * tof
-    first_path(x0, x1, tof, near, QUICK_NODES, path)
-    for i in range(QUICK_NODES):
-        # Hopeless legs, far off in phase, should get a hint too: they are settled by it.
-        path[i, 0] = max(path[i, 0], _QUICK_LEAST_MOTION)
+    first_path(x0, x1, tof, near, _LEAST_MOTION, QUICK_NODES, path)
     if not gauss_rows(path, tof, QUICK_NODES, rows):
         return np.nan
     z = smallest_impulse(rows, d, ve, 0.0, QUICK_NODES, 1, p, weights, g, c, m)
@@ -328,12 +327,19 @@ def turns_beside(q: int) -> int:
 
 
 @kernel
+def least_motion(q: int) -> float:
+    """Return the least mean motion of a first path, for the q-th number of revolutions."""
+    return _LEAST_MOTION if q == 0 else 0.0
+
+
+@kernel
 def refine(
     x0: _Array,
     x1: _Array,
     tof: float,
     ve: float,
     excess: float,
+    least: float,
     path_work: PathWork,
     flown: _Array,
     z: _Array,
@@ -343,7 +349,7 @@ def refine(
     A round that fails leaves the rest at the last value.
     """
     path, rows, p, weights, g, c, m, d = path_work
-    first_path(x0, x1, tof, excess, N_NODES, path)
+    first_path(x0, x1, tof, excess, least, N_NODES, path)
     if not gauss_rows(path, tof, N_NODES, rows):
         return False
     value = smallest_impulse(rows, d, ve, 0.0, N_NODES, _FIRST_STEPS, p, weights, g, c, m)
@@ -417,7 +423,7 @@ def leg_features(
         excess = near + _TWO_PI * turns_beside(q)
         z_first[q] = SATURATED
         d[5] = mean + excess - x0[0] * tof
-        first_path(x0, x1, tof, excess, N_NODES, path)
+        first_path(x0, x1, tof, excess, least_motion(q), N_NODES, path)
         if not gauss_rows(path, tof, N_NODES, rows):
             continue
         value = smallest_impulse(rows, d, ve, 0.0, N_NODES, 1, p, weights, g, c, m)
@@ -436,7 +442,7 @@ def leg_features(
     if second >= 0 and z_first[second] < _WORTH_REFINING * z_first[best]:
         excess = near + _TWO_PI * turns_beside(second)
         d[5] = mean + excess - x0[0] * tof
-        refine(x0, x1, tof, ve, excess, path_work, flown, z[_N_ROUNDS + 1 :])
+        refine(x0, x1, tof, ve, excess, least_motion(second), path_work, flown, z[_N_ROUNDS + 1 :])
     lambert_hints(s0, s1, tof, lambert_work, lam, branch)
     least = min(lam[0], lam[2], lam[4])
     for revs in range(MAX_REVS + 1):
@@ -448,7 +454,7 @@ def leg_features(
     for j in range(5):
         d[j] = x1[j] - x0[j]
     d[5] = mean + excess - x0[0] * tof
-    if not refine(x0, x1, tof, ve, excess, path_work, flown, z):
+    if not refine(x0, x1, tof, ve, excess, least_motion(best), path_work, flown, z):
         return np.nan
     hint = z[_N_ROUNDS]
     base = math.log(hint)
@@ -499,7 +505,8 @@ def leg_features(
         o += 4
     # On short arcs the Lambert path is the better hint.
     share = 1.0 / (1.0 + (out[13] / _SHORT_TURNS) ** 8)
-    blend = share * clip(math.log(z_lambert[0]) - base, -0.3, 0.3)
+    difference = math.log(z_lambert[0]) - base
+    blend = share * difference if abs(difference) < _LARGEST_BLEND else 0.0
     return float(math.log(total / tof) + blend)
 
 
@@ -517,7 +524,7 @@ def feature_workspace() -> FeatureWork:
             np.empty(3),
             np.empty(6),
             np.empty(6),
-            np.empty(13),
+            np.empty((1, 13)),
         ),
         (
             np.empty(2 * (MAX_REVS + 1)),

@@ -47,45 +47,58 @@ _LARGEST_ECCENTRICITY2 = 0.9**2
 
 
 @kernel
-def gauss_row(x: _Array, longitude: float, remaining: float, out: _Array) -> bool:
+def turned(s: float, c: float, change: float) -> tuple[float, float]:
+    """Return sine and cosine of an angle that was changed: by their series where it suffices."""
+    if abs(change) < 0.3:
+        z = change * change
+        sine = change * (1.0 - z / 6.0 * (1.0 - z / 20.0 * (1.0 - z / 42.0)))
+        cosine = 1.0 - 0.5 * z * (1.0 - z / 12.0 * (1.0 - z / 30.0))
+    else:
+        sine = math.sin(change)
+        cosine = math.cos(change)
+    return s * cosine + c * sine, c * cosine - s * sine
+
+
+@kernel
+def gauss_row(x: _Array, i: int, longitude: float, remaining: float, out: _Array) -> bool:
     """Write the 13 entries of C that are not zero, for one node; return False off the ellipses.
 
     Parameters
     ----------
-    x : (5,) float64
-        n, ex, ey, h, k.
+    x : (s, 5 or more) float64
+        n, ex, ey, h, k of all nodes.
+    i : int
+        The node.
     longitude : float
         Mean longitude.
     remaining : float
         Time to arrival.
-    out : (13,) float64
+    out : (s, 13) float64
         Effects of a radial, transverse and normal impulse: n by r and t; ex, ey by r, t
         and n; h by n; k by n; l by r, t and n.
     """
-    n, ex, ey, h, k = x[0], x[1], x[2], x[3], x[4]
+    n, ex, ey, h, k = x[i, 0], x[i, 1], x[i, 2], x[i, 3], x[i, 4]
     e2 = ex * ex + ey * ey
     if not (n > _LEAST_MOTION and e2 < _LARGEST_ECCENTRICITY2):
         return False
     eta = math.sqrt(1.0 - e2)
     b = 1.0 / (1.0 + eta)
     # Kepler's equation l = F - ex sin F + ey cos F; the derivatives vanish nowhere (e < 1).
-    f = longitude
-    s = math.sin(f)
-    c = math.cos(f)
-    f += (ex * s - ey * c) / (1.0 - 0.8 * (ex * c + ey * s))
+    s = math.sin(longitude)
+    c = math.cos(longitude)
+    change = (ex * s - ey * c) / (1.0 - 0.8 * (ex * c + ey * s))
+    f = longitude + change
+    s, c = turned(s, c, change)
     for _ in range(12):
-        s = math.sin(f)
-        c = math.cos(f)
         slope = 1.0 - ex * c - ey * s
         curve = ex * s - ey * c
         gap = f - curve - longitude
         newton = gap / slope
-        step = gap / (slope - 0.5 * newton * curve)
+        step = min(1.0, max(-1.0, gap / (slope - 0.5 * newton * curve)))
+        f -= step
+        s, c = turned(s, c, -step)
         if abs(step) < 1e-3:
-            # The rest of the step by Taylor's series of sine and cosine.
-            s, c = s - step * c - 0.5 * step * step * s, c + step * s - 0.5 * step * step * c
             break
-        f -= min(1.0, max(-1.0, step))
     root_a = 1.0 / np.cbrt(n)
     a = root_a * root_a
     r_a = 1.0 - ex * c - ey * s
@@ -101,37 +114,39 @@ def gauss_row(x: _Array, longitude: float, remaining: float, out: _Array) -> boo
     change_n = -3.0 * n * a / root
     n_r = change_n * sigma
     n_t = change_n * w
-    out[0] = n_r
-    out[1] = n_t
-    out[2] = root * sin_l
-    out[3] = over * ((w + 1.0) * cos_l + ex)
-    out[4] = -over * chi * ey
-    out[5] = -root * cos_l
-    out[6] = over * ((w + 1.0) * sin_l + ey)
-    out[7] = over * chi * ex
+    out[i, 0] = n_r
+    out[i, 1] = n_t
+    out[i, 2] = root * sin_l
+    out[i, 3] = over * ((w + 1.0) * cos_l + ex)
+    out[i, 4] = -over * chi * ey
+    out[i, 5] = -root * cos_l
+    out[i, 6] = over * ((w + 1.0) * sin_l + ey)
+    out[i, 7] = over * chi * ex
     tilt = 0.5 * over * (1.0 + h * h + k * k)
-    out[8] = tilt * cos_l
-    out[9] = tilt * sin_l
-    out[10] = -(p * (w - 1.0) * b + 2.0 * eta * r) / root + remaining * n_r
-    out[11] = (p + r) * sigma * b / root + remaining * n_t
-    out[12] = over * chi
+    out[i, 8] = tilt * cos_l
+    out[i, 9] = tilt * sin_l
+    out[i, 10] = -(p * (w - 1.0) * b + 2.0 * eta * r) / root + remaining * n_r
+    out[i, 11] = (p + r) * sigma * b / root + remaining * n_t
+    out[i, 12] = over * chi
     return True
 
 
 @kernel
 def first_path(
-    x0: _Array, x1: _Array, tof: float, excess: float, nodes: int, path: _Array
+    x0: _Array, x1: _Array, tof: float, excess: float, least: float, nodes: int, path: _Array
 ) -> None:
     """Write a path of elements at the nodes that leads from x0 to x1.
 
     The slow elements change linearly, but for a bump 6 s (1 - s) of the mean
     motion that makes up for the longitude `excess`, and the longitude is the
-    integral of the mean motion.
+    integral of the mean motion. The mean motion itself is kept above `least` of the smaller of
+    both ends, so that a short leg, on which the phase alone asks for more, has a path too.
     """
     n0, n1 = x0[0], x1[0]
+    bound = least * min(n0, n1)
     for i in range(nodes):
         s = (i + 0.5) / nodes
-        path[i, 0] = n0 + (n1 - n0) * s + 6.0 * excess / tof * s * (1.0 - s)
+        path[i, 0] = max(n0 + (n1 - n0) * s + 6.0 * excess / tof * s * (1.0 - s), bound)
         for j in range(1, 5):
             path[i, j] = x0[j] + (x1[j] - x0[j]) * s
         path[i, 5] = x0[5] + tof * s * (n0 + 0.5 * (n1 - n0) * s) + excess * s * s * (3 - 2 * s)
@@ -141,7 +156,7 @@ def first_path(
 def gauss_rows(path: _Array, tof: float, nodes: int, rows: _Array) -> bool:
     """Write the rows of all nodes of a path; return False if it leaves the ellipses."""
     for i in range(nodes):
-        if not gauss_row(path[i], path[i, 5], tof * (1.0 - (i + 0.5) / nodes), rows[i]):
+        if not gauss_row(path, i, path[i, 5], tof * (1.0 - (i + 0.5) / nodes), rows):
             return False
     return True
 
@@ -150,10 +165,15 @@ def gauss_rows(path: _Array, tof: float, nodes: int, rows: _Array) -> bool:
 def duals(rows: _Array, p: _Array, nodes: int, g: _Array) -> None:
     """Write C_i^T p and its length, (4,) a node."""
     for i in range(nodes):
-        c = rows[i]
-        g0 = c[0] * p[0] + c[2] * p[1] + c[5] * p[2] + c[10] * p[5]
-        g1 = c[1] * p[0] + c[3] * p[1] + c[6] * p[2] + c[11] * p[5]
-        g2 = c[4] * p[1] + c[7] * p[2] + c[8] * p[3] + c[9] * p[4] + c[12] * p[5]
+        g0 = rows[i, 0] * p[0] + rows[i, 2] * p[1] + rows[i, 5] * p[2] + rows[i, 10] * p[5]
+        g1 = rows[i, 1] * p[0] + rows[i, 3] * p[1] + rows[i, 6] * p[2] + rows[i, 11] * p[5]
+        g2 = (
+            rows[i, 4] * p[1]
+            + rows[i, 7] * p[2]
+            + rows[i, 8] * p[3]
+            + rows[i, 9] * p[4]
+            + rows[i, 12] * p[5]
+        )
         g[i, 0] = g0
         g[i, 1] = g1
         g[i, 2] = g2
@@ -174,31 +194,30 @@ def weighted_solve(
     g00 = g01 = g02 = g05 = g11 = g12 = g13 = g14 = g15 = 0.0
     g22 = g23 = g24 = g25 = g33 = g34 = g35 = g44 = g45 = g55 = 0.0
     for i in range(nodes):
-        c = rows[i]
         w = weights[i]
-        n0, n1 = w * c[0], w * c[1]
-        a0, a1, a2 = w * c[2], w * c[3], w * c[4]
-        b0, b1, b2 = w * c[5], w * c[6], w * c[7]
-        h2, k2, l2 = w * c[8], w * c[9], w * c[12]
-        g00 += n0 * c[0] + n1 * c[1]
-        g01 += n0 * c[2] + n1 * c[3]
-        g02 += n0 * c[5] + n1 * c[6]
-        g05 += n0 * c[10] + n1 * c[11]
-        g11 += a0 * c[2] + a1 * c[3] + a2 * c[4]
-        g12 += a0 * c[5] + a1 * c[6] + a2 * c[7]
-        g13 += a2 * c[8]
-        g14 += a2 * c[9]
-        g15 += a0 * c[10] + a1 * c[11] + a2 * c[12]
-        g22 += b0 * c[5] + b1 * c[6] + b2 * c[7]
-        g23 += b2 * c[8]
-        g24 += b2 * c[9]
-        g25 += b0 * c[10] + b1 * c[11] + b2 * c[12]
-        g33 += h2 * c[8]
-        g34 += h2 * c[9]
-        g35 += h2 * c[12]
-        g44 += k2 * c[9]
-        g45 += k2 * c[12]
-        g55 += w * (c[10] * c[10] + c[11] * c[11]) + l2 * c[12]
+        n0, n1 = w * rows[i, 0], w * rows[i, 1]
+        a0, a1, a2 = w * rows[i, 2], w * rows[i, 3], w * rows[i, 4]
+        b0, b1, b2 = w * rows[i, 5], w * rows[i, 6], w * rows[i, 7]
+        h2, k2, l2 = w * rows[i, 8], w * rows[i, 9], w * rows[i, 12]
+        g00 += n0 * rows[i, 0] + n1 * rows[i, 1]
+        g01 += n0 * rows[i, 2] + n1 * rows[i, 3]
+        g02 += n0 * rows[i, 5] + n1 * rows[i, 6]
+        g05 += n0 * rows[i, 10] + n1 * rows[i, 11]
+        g11 += a0 * rows[i, 2] + a1 * rows[i, 3] + a2 * rows[i, 4]
+        g12 += a0 * rows[i, 5] + a1 * rows[i, 6] + a2 * rows[i, 7]
+        g13 += a2 * rows[i, 8]
+        g14 += a2 * rows[i, 9]
+        g15 += a0 * rows[i, 10] + a1 * rows[i, 11] + a2 * rows[i, 12]
+        g22 += b0 * rows[i, 5] + b1 * rows[i, 6] + b2 * rows[i, 7]
+        g23 += b2 * rows[i, 8]
+        g24 += b2 * rows[i, 9]
+        g25 += b0 * rows[i, 10] + b1 * rows[i, 11] + b2 * rows[i, 12]
+        g33 += h2 * rows[i, 8]
+        g34 += h2 * rows[i, 9]
+        g35 += h2 * rows[i, 12]
+        g44 += k2 * rows[i, 9]
+        g45 += k2 * rows[i, 12]
+        g55 += w * (rows[i, 10] * rows[i, 10] + rows[i, 11] * rows[i, 11]) + l2 * rows[i, 12]
     m[0, 0], m[1, 0], m[2, 0], m[3, 0], m[4, 0], m[5, 0] = g00, g01, g02, 0.0, 0.0, g05
     m[1, 1], m[2, 1], m[3, 1], m[4, 1], m[5, 1] = g11, g12, g13, g14, g15
     m[2, 2], m[3, 2], m[4, 2], m[5, 2] = g22, g23, g24, g25
@@ -333,14 +352,13 @@ def flown_path(
     for i in range(nodes):
         w = 0.5 * weights[i]
         r, t, o = w * g[i, 0], w * g[i, 1], w * g[i, 2]
-        c = rows[i]
         remaining = tof - (i + 0.5) * dt
-        dn = c[0] * r + c[1] * t
-        dex = c[2] * r + c[3] * t + c[4] * o
-        dey = c[5] * r + c[6] * t + c[7] * o
-        dh = c[8] * o
-        dk = c[9] * o
-        dl = c[10] * r + c[11] * t + c[12] * o - remaining * dn
+        dn = rows[i, 0] * r + rows[i, 1] * t
+        dex = rows[i, 2] * r + rows[i, 3] * t + rows[i, 4] * o
+        dey = rows[i, 5] * r + rows[i, 6] * t + rows[i, 7] * o
+        dh = rows[i, 8] * o
+        dk = rows[i, 9] * o
+        dl = rows[i, 10] * r + rows[i, 11] * t + rows[i, 12] * o - remaining * dn
         path[i, 0] = n + dn
         path[i, 1] = ex + dex
         path[i, 2] = ey + dey
