@@ -8,6 +8,7 @@ from typing import Final
 
 from feasibility import command_evaluate, command_study, command_train
 from feasibility.errors import InputError, MissingDependencyError
+from feasibility.sims_flanagan.prepare import prefer_fast_compilation
 
 _DESCRIPTION: Final = """\
 Know whether a low-thrust leg can be flown: make the data, look at it.
@@ -41,6 +42,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     0: done; 1: a worker process died; 2: input that cannot be used, with one
     line on stderr; 130: interrupted.
     """
+    prefer_fast_compilation()
     parsed = _parser().parse_args(arguments)
     try:
         return int(parsed.run(parsed))

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Final
 
 from feasibility import InputError, MissingDependencyError
+from feasibility.sims_flanagan.prepare import prefer_fast_compilation
 
 _DESCRIPTION: Final = """\
 Find asteroid tours for a low-thrust spacecraft.
@@ -44,6 +45,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     0: done (and, for ``verify``, everything holds); 1: verification failed;
     2: input that cannot be used, with one line on stderr.
     """
+    prefer_fast_compilation()
     parsed = _parser().parse_args(arguments)
     try:
         return int(parsed.run(parsed))

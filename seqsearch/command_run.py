@@ -1,13 +1,14 @@
 """What ``seqsearch run`` does: read, check, search, write, report."""
 
 import os
+from concurrent.futures import Executor
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from feasibility import InputError
-from feasibility.sims_flanagan.prepare import compile_kernels
+from feasibility import InputError, Pruner
+from feasibility.sims_flanagan.prepare import compile_kernels, sample_leg
 from feasibility.workers import worker_pool
 from seqsearch.beam import search
 from seqsearch.config import build_problem, override, read_config, with_catalogue
@@ -58,9 +59,9 @@ def run_search(
         folder.write(tour, records)
         print(_rank_line(counters, tour), flush=True)
 
-    if config.search.solver == "fast":
-        compile_kernels()
     with worker_pool(workers or os.cpu_count() or 1) as executor:
+        if config.search.solver == "fast":
+            _compile_side_by_side(executor, pruner)
         result = search(
             problem,
             pruner=pruner,
@@ -79,6 +80,16 @@ def run_search(
     print(f"{result.tour.summary()}; search {result.stopped}")
     print(f"check it with: seqsearch verify {folder.path}")
     return 0
+
+
+def _compile_side_by_side(executor: Executor | None, pruner: Pruner) -> None:
+    """Compile the solver's kernels in one worker while this process compiles the pruner's."""
+    solver = None if executor is None else executor.submit(compile_kernels)
+    pruner.keep(sample_leg())
+    if solver is None:
+        compile_kernels()
+    else:
+        solver.result()
 
 
 def _rank_line(counters: RankCounters, tour: Tour) -> str:

@@ -84,7 +84,7 @@ def linearise(
     shoot_stm(x0, dv, n, dt, x, w.m)
     if not element_gap(x, target, gap):
         return np.inf
-    if not element_derivatives(x, 0, w.m[LOWER], w.v):
+    if not element_derivatives(x, int(0), w.m[LOWER], w.v):
         return np.inf
     sensitivities(w.m, w.m[LOWER], n, w.b[0], w.m[M_ONE], w.m[M_TWO])
     if not whiten(w.b[0], n, w.m[M_ONE], w.m[LOWER]):

@@ -119,7 +119,7 @@ def lifted_sweep(
     for i in range(n):
         from_elements(nodes[i], x)
         if not first:
-            if not element_derivatives(x, 0, one, w.v):
+            if not element_derivatives(x, int(0), one, w.v):
                 return -1.0, np.inf
             for j in range(3):
                 x[3 + j] += dv[i, j]
@@ -129,7 +129,7 @@ def lifted_sweep(
             jumps[i, j] -= nodes[i, j]
         jumps[i, 5] = wrap(jumps[i, 5])
         if first:
-            if not element_derivatives(x, 3, two, w.v):
+            if not element_derivatives(x, int(3), two, w.v):
                 return -1.0, np.inf
             for j in range(6):
                 for k in range(3):
@@ -137,7 +137,7 @@ def lifted_sweep(
                 for k in range(6):
                     w.m[i, j, k] = 1.0 if j == k else 0.0
         else:
-            if not element_derivatives(x, 0, two, w.v):
+            if not element_derivatives(x, int(0), two, w.v):
                 return -1.0, np.inf
             for j in range(6):
                 for k in range(3):

@@ -93,7 +93,7 @@ def bend(
     fresh = not w.v[Z, s] < np.inf
     z = -1.0 if fresh else w.v[Z, s]
     relax = 1.0 if fresh else _RELAX
-    count = 0
+    count = int(0)
     for sweep in range(sweeps):
         z, move = lifted_sweep(
             w.v[E0],
@@ -118,7 +118,9 @@ def bend(
                 break
             if sweep >= 3 and z > _LOST * best:
                 return False
-        count = advance(nodes, start, n, relax, 0 if fresh else count, w)
+        if fresh:
+            count = int(0)
+        count = advance(nodes, start, n, relax, count, w)
         if count < 0:
             break
         if fresh:
@@ -134,11 +136,11 @@ def finish(s: int, x0: _Array, tof: float, c: float, n: int, best: float, w: Wor
     for i in range(n):
         for j in range(3):
             dv[i, j] = w.n3[STARTS + s, i, j]
-    if not close(x0, dv, n, dt, target, 1e-9, 12, w):
+    if not close(x0, dv, n, dt, target, 1e-9, int(12), w):
         return np.inf
     lam = w.v[START_LAM + s]
     z = improve(x0, dv, n, n // 2, dt, c, target, 30, 1e-4, _HOPELESS * best, lam, w)
-    if z < best and close(x0, dv, n, dt, target, 1e-12, 4, w):
+    if z < best and close(x0, dv, n, dt, target, 1e-12, int(4), w):
         return z_of_impulses(dv, n, n // 2, c)
     return z
 
@@ -191,6 +193,9 @@ def maximum_batch(
     x1 = np.empty(6)
     best_dv = np.empty((n, 3))
     straight = np.zeros((5, 3))
+    # Literal integers would make numba compile a kernel once for each value.
+    no_sweeps = int(0)
+    first_and_gentle = int(_FIRST_SWEEPS + _GENTLE)
     for row in range(rv0.shape[0]):
         length, speed = scale_leg(rv0[row], rv1[row], mu, frame, x0, x1)
         tof = tof_s[row] * speed / length
@@ -201,7 +206,7 @@ def maximum_batch(
         agreed = 0
         for s in range(_N_TURNS):
             if lay_path(s, turns_of(s), straight, tof, n, w):
-                bend(s, _FIRST_SWEEPS, 0, tof, c, n, best, w)
+                bend(s, int(_FIRST_SWEEPS), no_sweeps, tof, c, n, best, w)
             w.v[TURN_Z, s] = w.v[Z, s]
         # On short legs all starts agree.
         n_bent = bent.shape[0] if w.v[LONGITUDE, 0] - w.v[E0, 5] > _SHORT else 0
@@ -215,13 +220,13 @@ def maximum_batch(
                 if not w.v[Z, s] < _SCREEN * best:
                     continue
             else:
-                s = _N_TURNS
+                s = int(_N_TURNS)
                 start = attempt if k < n_bent else _N_TURNS + bent.shape[0]
                 shape = bent[k] if k < n_bent else shapes[row, k - n_bent]
                 if lay_path(s, turns_of(likely_turn(k, best, w)), shape, tof, n, w):
-                    bend(s, _FIRST_SWEEPS + _GENTLE, _GENTLE, tof, c, n, best, w)
+                    bend(s, first_and_gentle, int(_GENTLE), tof, c, n, best, w)
             z = np.inf
-            if w.v[Z, s] < np.inf and bend(s, _SWEEPS, 0, tof, c, n, best, w):
+            if w.v[Z, s] < np.inf and bend(s, int(_SWEEPS), no_sweeps, tof, c, n, best, w):
                 z = finish(s, x0, tof, c, n, best, w)
             w.v[Z, s] = np.inf
             if k < 0 and z < np.inf:
