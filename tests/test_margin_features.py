@@ -117,15 +117,15 @@ def test_the_unit_of_acceleration_is_that_of_the_departure_orbit():
 def test_gauss_rows_are_what_a_small_impulse_does(seed):
     rng = np.random.default_rng(seed)
     x = np.array([rng.uniform(0.4, 2.5), *rng.uniform(-0.5, 0.5, 4), rng.uniform(-3, 3)])
-    state, row, plus, minus = np.empty(6), np.empty(13), np.empty(6), np.empty(6)
+    state, row, plus, minus = np.empty(6), np.empty((1, 13)), np.empty(6), np.empty(6)
     from_elements(x, state)
     remaining = rng.uniform(0.0, 5.0)
-    assert gauss_row(x, x[5], remaining, row)
+    assert gauss_row(x.reshape(1, 6), 0, x[5], remaining, row)
     r, v = state[:3], state[3:]
     radial = r / np.linalg.norm(r)
     normal = np.cross(r, v) / np.linalg.norm(np.cross(r, v))
     axes = (radial, np.cross(normal, radial), normal)
-    n_r, n_t, ex_r, ex_t, ex_n, ey_r, ey_t, ey_n, h_n, k_n, l_r, l_t, l_n = row
+    n_r, n_t, ex_r, ex_t, ex_n, ey_r, ey_t, ey_n, h_n, k_n, l_r, l_t, l_n = row[0]
     written = ((n_r, ex_r, ey_r, 0, 0, l_r), (n_t, ex_t, ey_t, 0, 0, l_t),
                (0, ex_n, ey_n, h_n, k_n, l_n))  # fmt: skip
     for axis, effect in zip(axes, written, strict=True):
@@ -192,6 +192,16 @@ def test_lambert_singularities_do_no_harm(angle):
     assert np.isfinite(X).all()
     solved = fast_max_initial_mass(leg)
     assert abs(hint - log_acceleration(leg, solved.m0))[0] < 0.05
+
+
+def test_short_legs_far_off_in_phase_take_the_nearest_number_of_revolutions():
+    legs = drawn("search", 200)
+    short = Legs(legs.rv_dep, legs.rv_arr, 40.0, 1000.0, 0.3, 3000.0, 0.0)
+    X, hint = margin_features(short)
+    column = dict(zip(FEATURES, X.T, strict=True))
+    assert np.isfinite(hint).all()
+    assert np.abs(column["phase_rate"]).max() > 0.5
+    assert (column["chosen_beside_nearest"] == 0).all()
 
 
 def test_unbound_orbits_have_no_features():

@@ -34,6 +34,25 @@ Fickle.keep: not row-wise: a leg gets another answer when the legs are reversed
 
 `NearbyOnly` passes (where its class can be imported, so that it can be pickled),
 and goes wherever a pruner is asked for, also inside `AllOf`.
+
+Any scikit-learn model is one with ten lines. `margin_features` gives inputs that fit any
+spacecraft; add thrust over mass, which they leave out. An ONNX session is wrapped likewise,
+loaded in `__post_init__` from its file's bytes, as a session itself cannot be pickled.
+
+>>> from feasibility.learning.margin.features import log_acceleration, margin_features
+>>> @dataclass(frozen=True)
+... class ModelPruner:
+...     model: object  # fitted, with predict_proba(X) -> (n, 2)
+...     threshold: float
+...     name = "my-model"
+...     def keep(self, legs, /):
+...         X, hint = margin_features(legs)
+...         X = np.column_stack([X, log_acceleration(legs, legs.m0) - hint])
+...         known = np.isfinite(X).all(axis=1)
+...         kept = ~known  # nothing is known against the others
+...         if known.any():
+...             kept[known] = self.model.predict_proba(X[known])[:, 1] >= self.threshold
+...         return kept
 """
 
 from feasibility.pruners.all_of import AllOf, pruner_name

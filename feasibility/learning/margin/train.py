@@ -316,13 +316,23 @@ def train_margin(
         },
         provenance={
             **provenance(),
-            "datasets": [
-                {name: dataset.metadata[name] for name in ("protocol", "seed", "catalogue")}
-                | {"legs": len(dataset)}
-                for dataset in datasets
-            ],
+            "datasets": [_record(dataset) for dataset in datasets],
         },
     )
+
+
+def _record(dataset: Dataset) -> dict[str, Any]:
+    """Return what a dataset is, without the folders of the machine that made it."""
+    protocol, catalogue = dict(dataset.metadata["protocol"]), dict(dataset.metadata["catalogue"])
+    table = dict(protocol.get("catalogue", {}))
+    if table.get("file") is not None:
+        table["file"] = catalogue["source"] = Path(table["file"]).name
+    return {
+        "protocol": protocol | {"catalogue": table},
+        "catalogue": catalogue,
+        "seed": dataset.metadata["seed"],
+        "legs": len(dataset),
+    }
 
 
 def _fit(
@@ -392,8 +402,10 @@ def _fit(
             size_loss = scale_out + miss * torch.exp(-scale_out)
         return (importance * loss).mean(), (importance * size_loss).mean()
 
+    # A training may go on with other threads or elsewhere, though not to the last digit the same.
+    settings = asdict(recipe) | {"threads": None, "device": None}
     identity = hashlib.sha256(
-        json.dumps([asdict(recipe), layers, width, epochs]).encode() + error[learned].tobytes()
+        json.dumps([settings, layers, width, epochs]).encode() + error[learned].tobytes()
     ).hexdigest()
     state: dict[str, Any] = {"epoch": 0, "best_epoch": 0, "best_loss": np.inf, "history": []}
     best = {name: value.clone() for name, value in network.state_dict().items()}

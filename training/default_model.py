@@ -1,0 +1,98 @@
+"""Make the default model: generate its legs, train it, judge it on fresh legs.
+
+Run from the root of the checkout, with the folder `shared` beside it. About six hours of
+processor time for the legs on two cores, ten minutes for the training; every step goes on
+where it was interrupted, and --share makes a smaller model of the same kind:
+
+    python training/default_model.py --out data/default [--share 0.1] [--workers 2]
+
+The families are those of docs/classifier.md. Seeds of training and test differ, and test legs
+have the natural mix of their protocol, without draws at the boundary.
+"""
+
+import argparse
+import sys
+from pathlib import Path
+
+import msgspec
+
+from feasibility.cli import main as feasibility
+from feasibility.dataset import read_protocol
+from feasibility.dataset.generate import begin
+from feasibility.dataset.protocol import Protocol, SpacecraftTable
+from feasibility.workers import worker_pool
+
+TRAINING_SEED, TEST_SEED = 11, 7001
+LEGS_PER_SHARD = 1000
+# Family: (legs for training, legs for the test).
+FAMILIES = {
+    "search": (120_000, 20_000),
+    "table1": (93_000, 10_000),
+    "nea": (140_000, 10_000),
+    "neaall": (16_000, 0),
+    "general": (130_000, 10_000),
+    "craft1500": (14_000, 0),
+    "craft2100": (8_000, 3_000),
+    "craft2900": (11_000, 0),
+    "craft3900": (8_000, 3_000),
+    "craft5000": (8_000, 0),
+}
+NEAR_EARTH = {"nea": "limited", "neaall": "table1"}
+
+
+def protocol(family: str, tables: Path) -> Protocol:
+    """Return the protocol of a family: a built-in one on an official table, masses only.
+
+    craftN: random pairs like table1, with an engine of N s and flight times over a wider range.
+    """
+    table = "GTOC5-DATA.txt" if family in NEAR_EARTH else "GTOC7-DATA.txt"
+    isp = family.removeprefix("craft") if family.startswith("craft") else None
+    base = "table1" if isp else NEAR_EARTH.get(family, family)
+    made = read_protocol(base).with_catalogue(str(tables / table))
+    changes = {"name": family, "propellant": False, "legs_per_shard": LEGS_PER_SHARD}
+    if isp:
+        sampler = msgspec.structs.replace(made.sampler, tof_ratio=(0.4, 3.0))
+        craft = SpacecraftTable(dry_mass_kg=1000.0, thrust_n=0.236, isp_s=float(isp))
+        changes |= {"sampler": sampler, "spacecraft": craft}
+    return msgspec.structs.replace(made, **changes)
+
+
+def generate(made: Protocol, legs: int, folder: Path, seed: int, workers: int) -> None:
+    """Make or complete one dataset."""
+    generation = begin(made, legs, folder, seed=seed)
+    print(f"{folder}: {generation.legs_missing} of {legs} legs to make", flush=True)
+    with worker_pool(workers) as pool:
+        generation.run(pool, in_flight=2 * workers)
+
+
+def main() -> int:
+    """Do everything and return the exit code."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--out", type=Path, default=Path("data/default"), help="folder")
+    parser.add_argument("--share", type=float, default=1.0, help="of the legs (default 1)")
+    parser.add_argument("--workers", type=int, default=2, help="processes (default 2)")
+    parser.add_argument("--epochs", default="34", help="of the training (default 34)")
+    parser.add_argument("--shared", type=Path, default=Path("../shared"), help="data folder")
+    options = parser.parse_args()
+    tables = options.shared / "gtoc" / "official"
+    learned, test = [], []
+    for family, counts in FAMILIES.items():
+        made = protocol(family, tables)
+        for legs, seed, part, folders in (
+            (counts[0], TRAINING_SEED, "train", learned),
+            (counts[1], TEST_SEED, "test", test),
+        ):
+            if not legs:
+                continue
+            if part == "test":
+                made = msgspec.structs.replace(made, boundary_share=0.0)
+            folder = options.out / part / family
+            generate(made, int(legs * options.share), folder, seed, options.workers)
+            folders.append(str(folder))
+    model = str(options.out / "default.seqmodel")
+    recipe = ["--model", "margin", "--epochs", options.epochs, "--seed", "1", "--out", model]
+    return feasibility(["train", *learned, *recipe]) or feasibility(["evaluate", model, *test])
+
+
+if __name__ == "__main__":
+    sys.exit(main())
