@@ -35,6 +35,7 @@ _Scratch = tuple[_Array, _Array, _Array]
 
 _MAX_EVALUATIONS = 80
 _TOLERANCE = 1e-12
+_SECANT_TOLERANCE = 1e-11
 
 
 @kernel
@@ -68,6 +69,26 @@ def mima_acceleration(dv1: _Array, dv2: _Array, tof: float) -> tuple[float, floa
     root = math.sqrt(k * k + 4.0)
     x = 2.0 / (2.0 + (4.0 / (root + k) if k > 0.0 else root - k))
     return math.sqrt(dd + 2.0 * de / x + ee / (x * x)) / tof, x
+
+
+@kernel
+def _mima_slope(dv1: _Array, dv2: _Array, x: float) -> float:
+    """Return d/dx of (a1 - a2) / (a1 + a2) of MIMA at the switch x: MIMA2's, nearly."""
+    ee = 0.0
+    de = 0.0
+    dd = 0.0
+    for i in range(3):
+        d = dv1[i] + dv2[i]
+        e = dv1[i] - dv2[i]
+        dd += d * d
+        de += d * e
+        ee += e * e
+    y = 1.0 - x
+    a1 = math.sqrt(dd + (2.0 * de + ee / x) / x)
+    a2 = math.sqrt(dd - (2.0 * de - ee / y) / y)
+    slope1 = -(de + ee / x) / (x * x * a1)
+    slope2 = -(de - ee / y) / (y * y * a2)
+    return 2.0 * (a2 * slope1 - a1 * slope2) / ((a1 + a2) * (a1 + a2))
 
 
 @kernel
@@ -184,6 +205,7 @@ def mima2_acceleration(
     x2, f2 = 0.0, 1.0
     _, x = mima_acceleration(dv1, dv2, tof)
     t = 1.0 - min(max(x, 0.1), 0.9)
+    slope = _mima_slope(dv1, dv2, 1.0 - t)
     f = np.nan
     mean = np.nan
     for _ in range(_MAX_EVALUATIONS):
@@ -194,7 +216,7 @@ def mima2_acceleration(
         mean = 0.5 * (a1 + a2)
         if not (abs(f) > _TOLERANCE):
             break
-        if abs(f * f_before) < _TOLERANCE:
+        if abs(f * f_before) < _SECANT_TOLERANCE:
             # A secant step from here errs by the product of the two: evaluating it is not needed.
             mean += (mean - mean_before) * f / (f_before - f)
             break
@@ -207,6 +229,10 @@ def mima2_acceleration(
         limit = _TOLERANCE / abs(x2 - x1)
         if limit > 0.5:
             break
+        if math.isnan(f_before):
+            # Only one point is known: MIMA's slope leads on from it.
+            t = min(max(-f / (slope * (x2 - x1)), 0.01), 0.99)
+            continue
         xi = (x1 - x2) / (x3 - x2)
         phi = (f1 - f2) / (f3 - f2)
         t = 0.5
