@@ -1,7 +1,6 @@
 """Pruners named in a configuration or on the command line."""
 
 from collections.abc import Callable
-from pathlib import Path
 from typing import Final
 
 from feasibility import AllOf, InputError, LambertPruner, Mima2Pruner, MimaPruner, Pruner
@@ -13,6 +12,7 @@ _BY_NAME: Final[dict[str, Callable[..., Pruner]]] = {
 }
 
 _MODEL_SUFFIX: Final = ".seqmodel"
+_DEFAULT_MODEL: Final = "default"
 
 
 def parse_pruner(spec: str) -> AllOf:
@@ -23,9 +23,10 @@ def parse_pruner(spec: str) -> AllOf:
     spec : str
         Comma-separated names, each with an optional parameter after a colon:
         ``"lambert:1.3,mima2:0.97"``. ``"none"`` keeps every leg. The parameter
-        is the factor of `LambertPruner` or the margin of the MIMA pruners. A
-        name that ends in ``.seqmodel`` is the file of a trained classifier;
-        its parameter is the recall.
+        is the factor of `LambertPruner` or the margin of the MIMA pruners.
+        ``"default"`` is the classifier that comes with the package, a name that
+        ends in ``.seqmodel`` the file of another one; their parameter is the
+        recall.
 
     Raises
     ------
@@ -40,11 +41,12 @@ def parse_pruner(spec: str) -> AllOf:
 
 def _parse_one(part: str, spec: str) -> Pruner:
     name, colon, parameter = part.rpartition(":") if ":" in part else (part, "", "")
-    make = _classifier_pruner(name) if name.endswith(_MODEL_SUFFIX) else _BY_NAME.get(name)
+    is_model = name == _DEFAULT_MODEL or name.endswith(_MODEL_SUFFIX)
+    make = _classifier_pruner(name) if is_model else _BY_NAME.get(name)
     if make is None:
         raise InputError(
-            f"pruner {spec!r}: unknown pruner {name!r}; known are none, {', '.join(_BY_NAME)} "
-            f"and the path of a trained model (*{_MODEL_SUFFIX})"
+            f"pruner {spec!r}: unknown pruner {name!r}; known are none, {', '.join(_BY_NAME)}, "
+            f"default and the path of a trained model (*{_MODEL_SUFFIX})"
         )
     if not colon:
         return make()
@@ -62,7 +64,7 @@ def _classifier_pruner(path: str) -> Callable[..., Pruner]:
     from feasibility.classifier import FeasibilityClassifier
     from feasibility.pruners.classifier import ClassifierPruner
 
-    classifier = FeasibilityClassifier.load(Path(path))
+    classifier = FeasibilityClassifier.load(path)
 
     def make(recall: float = 0.99) -> Pruner:
         return ClassifierPruner(classifier, recall)
