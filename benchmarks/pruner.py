@@ -5,8 +5,9 @@ Run from the repository: python benchmarks/pruner.py [--legs N] [--threads 2]
 The candidates are those of the protocol "search" in a synthetic main belt. Each
 pruner gets them as legs, so its time is with features and everything; the
 kernels and BLAS release the lock, so the batch is split over threads.
-pykep's mima2_from_hop, one leg at a time, is timed on a few of them, on one
-core, and so is the public package neural_lowthrust where it is installed.
+pykep's mima2, one leg at a time on a few of them and on one core, is given
+its Lambert arc, so its time is without that. Times are by the wall clock: other work on the
+same cores makes all of them longer.
 """
 
 import argparse
@@ -38,9 +39,7 @@ def candidates(n: int) -> Legs:
     protocol = read_protocol("search")
     rng = np.random.default_rng(0)
     catalogue = synthetic_main_belt(16256, rng)
-    return protocol.sampler.draw(
-        n, rng, catalogue, protocol.craft(), protocol.impulsive_grid
-    ).legs
+    return protocol.sampler.draw(n, rng, catalogue, protocol.craft(), protocol.impulsive_grid).legs
 
 
 def seconds(call: Callable[[], object]) -> float:
@@ -74,7 +73,9 @@ def pykep_mima2_rate(legs: Legs) -> float:
         v1, v2 = np.array(lambert.v0[0]), np.array(lambert.v1[0])
         state = [legs.rv_dep[i, :3].tolist(), v1.tolist()]
         impulses = [(v1 - legs.rv_dep[i, 3:]).tolist(), (legs.rv_arr[i, 3:] - v2).tolist()]
-        problems.append((state, *impulses, legs.tof_s[i], legs.thrust[i], legs.exhaust_velocity[i]))
+        problems.append(
+            (state, *impulses, legs.tof_s[i], legs.thrust[i], legs.exhaust_velocity[i])
+        )
 
     def call() -> None:
         for problem in problems:

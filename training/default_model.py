@@ -1,8 +1,8 @@
 """Make the default model: generate its legs, train it, judge it on fresh legs.
 
-Run from the root of the checkout, with the folder `shared` beside it. About six hours of
-processor time for the legs on two cores, ten minutes for the training; every step goes on
-where it was interrupted, and --share makes a smaller model of the same kind:
+Run from the root of the checkout, with the folder `shared` beside it. A leg takes 1 to 5 ms of
+processor time, the training some ten minutes; every step goes on where it was
+interrupted, and --share makes a smaller model of the same kind:
 
     python training/default_model.py --out data/default [--share 0.1] [--workers 2]
 
