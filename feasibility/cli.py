@@ -11,11 +11,14 @@ from feasibility.errors import InputError, MissingDependencyError
 from feasibility.sims_flanagan.prepare import prefer_fast_compilation
 
 _DESCRIPTION: Final = """\
-Know whether a low-thrust leg can be flown: make the data, look at it.
+Know whether a low-thrust leg can be flown: make the data, look at it, train and
+judge classifiers, repeat the experiments of the paper.
 
   feasibility generate search --legs 20000 --out data/search
   feasibility inspect data/search
   feasibility protocols table1            print a protocol, to make your own
+  feasibility train data/search --model margin --out mine.seqmodel
+  feasibility evaluate mine.seqmodel data/search
 """
 
 _GENERATE: Final = """\

@@ -77,7 +77,8 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument(
         "--pruner",
         metavar="SPEC",
-        help="such as lambert:1.3,mima2:0.97, a trained model as FILE.seqmodel:RECALL, or none",
+        help="such as lambert:1.3,mima2:0.97; default:RECALL or FILE.seqmodel:RECALL for a "
+        "trained model; none keeps all",
     )
     run.add_argument("--solver", choices=("fast", "reference"), help="leg solver")
     run.set_defaults(run=_run)
