@@ -14,6 +14,7 @@ from feasibility.errors import InputError
 from feasibility.learning import features as paper
 from feasibility.learning.artefact import Artefact
 from feasibility.learning.margin.estimator import MarginEstimator
+from feasibility.learning.margin.prediction import LegPrediction
 from feasibility.learning.paper_estimator import PaperEstimator
 from feasibility.legs import Legs
 
@@ -112,6 +113,32 @@ class FeasibilityClassifier:
             The model knows no margins: only those of kind "margin" do.
         """
         return np.exp(self._margin_estimator().estimate(legs)[0])
+
+    def final_mass(self, legs: Legs) -> NDArray[np.float64]:
+        """Return (n,) kg, the estimate of the mass at arrival with least propellant.
+
+        Where the margin is below 1 the leg cannot be flown at its initial mass, and the
+        answer is what full thrust all the time would leave. The dry mass plays no part. NaN
+        where nothing is known.
+
+        Raises
+        ------
+        InputError
+            As for `margin`.
+        """
+        return self.predict(legs).final_mass
+
+    def predict(self, legs: Legs) -> LegPrediction:
+        """Return margin, probability, final mass and more of n legs, at the cost of one of them.
+
+        All are by the large net; `feasible_probability` lets the quick one settle clear cases.
+
+        Raises
+        ------
+        InputError
+            As for `margin`.
+        """
+        return self._margin_estimator().predict(legs)
 
     def max_initial_mass(self, legs: Legs) -> NDArray[np.float64]:
         """Return (n,) the estimate of m* in kg; otherwise as `margin`."""

@@ -8,7 +8,14 @@ import sys
 import numpy as np
 import pytest
 
-from feasibility import ClassifierPruner, FeasibilityClassifier, InputError, Legs, check_pruner
+from feasibility import (
+    ClassifierPruner,
+    FeasibilityClassifier,
+    InputError,
+    Legs,
+    check_pruner,
+    optimise,
+)
 from feasibility.cli import main
 from feasibility.constants import AU
 from feasibility.dataset import Dataset
@@ -234,3 +241,34 @@ print(json.dumps(sorted(sys.modules)))
     done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
     loaded = {name.partition(".")[0] for name in json.loads(done.stdout)}
     assert not loaded & {"torch", "sklearn", "optuna", "imblearn", "pykep", "pygmo", "matplotlib"}
+
+
+def test_one_prediction_has_every_answer(default, legs):
+    told = default.predict(legs)
+    np.testing.assert_array_equal(told.margin, default.margin(legs))
+    np.testing.assert_array_equal(told.margin_error, default.margin_error(legs))
+    np.testing.assert_array_equal(told.final_mass, default.final_mass(legs))
+    flyable = default.feasible_probability(legs) >= 0.5
+    assert np.mean((told.probability >= 0.5) == flyable) > 0.995
+    assert np.mean(told.in_domain == default.in_domain(legs)) > 0.995
+
+
+def test_nothing_is_said_of_unbound_orbits(default):
+    fast = [2 * AU, 0, 0, 0, 4e4, 0]
+    told = default.predict(Legs(fast, fast, 300.0, 1500.0, 0.236, 4190.0, 1000.0))
+    assert np.isnan([told.margin, told.margin_error, told.final_mass]).all()
+    assert told.probability.tolist() == [0.5]
+    assert not told.in_domain.any()
+
+
+def test_the_final_mass_is_that_of_the_solver_or_of_full_thrust(default, legs):
+    some = legs.take(np.arange(150))
+    solved = optimise(some)
+    told = default.predict(some)
+    rows = np.flatnonzero(np.isfinite(solved.m_final) & solved.converged & (told.margin > 1.0))
+    assert len(rows) > 30
+    error = np.abs(told.final_mass[rows] / solved.m_final[rows] - 1.0)
+    assert np.median(error) < 0.1
+    heavy = told.margin < 1.0
+    left = np.maximum(some.m0 - some.thrust * some.tof_s / some.exhaust_velocity, 0.0)
+    np.testing.assert_allclose(told.final_mass[heavy], left[heavy])

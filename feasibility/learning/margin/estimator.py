@@ -17,6 +17,8 @@ from feasibility.learning.margin.features import (
     quick_features,
 )
 from feasibility.learning.margin.network import MarginNet
+from feasibility.learning.margin.prediction import LegPrediction
+from feasibility.learning.margin.propellant import final_mass
 from feasibility.legs import Legs
 
 _Array = NDArray[np.float64]
@@ -104,7 +106,11 @@ class MarginEstimator:
 
         NaN where no features exist.
         """
-        X, hint = margin_features(legs)
+        return self._estimate(legs, *margin_features(legs))
+
+    def _estimate(
+        self, legs: Legs, X: _Array, hint: _Array
+    ) -> tuple[_Array, _Array, NDArray[np.bool_]]:
         log_margin = np.full(len(legs), np.nan)
         doubt = np.full(len(legs), np.nan)
         inside = np.zeros(len(legs), dtype=np.bool_)
@@ -113,6 +119,23 @@ class MarginEstimator:
         log_margin[rows] = log_acceleration(legs, legs.m0)[rows] - hint[rows] - correction
         inside[rows] = self._inside(X[rows])
         return log_margin, doubt, inside
+
+    def predict(self, legs: Legs) -> LegPrediction:
+        """Return all answers for n legs from one computation of their features."""
+        X, hint = margin_features(legs)
+        log_margin, doubt, inside = self._estimate(legs, X, hint)
+        rows = np.flatnonzero(np.isfinite(log_margin))
+        probability = np.full(len(legs), _UNKNOWN)
+        probability[rows] = self._calibration.probability(log_margin[rows], doubt[rows])
+        mass = np.full(len(legs), np.nan)
+        mass[rows] = final_mass(legs.take(rows), X[rows], log_margin[rows])
+        return LegPrediction(
+            margin=np.exp(log_margin),
+            margin_error=doubt,
+            probability=probability,
+            final_mass=mass,
+            in_domain=inside,
+        )
 
     def _inside(self, X: _Array) -> NDArray[np.bool_]:
         quantities = domain_quantities(X)
