@@ -25,6 +25,7 @@ from feasibility.learning.study.context import Context
 from feasibility.learning.study.data import N_FOLDS, StudyData
 from feasibility.learning.study.data_size import learning_exponent
 from feasibility.learning.study.fit import MARGIN_EDGES, Fit, judge, run_fit
+from feasibility.learning.study.margin import margin_recipe, run_margin
 from feasibility.learning.study.presets import MODELS, PRESETS, find_preset
 from feasibility.learning.study.report import BY_HAND, write_document
 from feasibility.learning.study.result import Result, Table
@@ -179,6 +180,40 @@ def test_table_6_stands_beside_ours(study):
         assert [float(value.split(" ± ")[0]) for value in ours[3:]] == pytest.approx(
             [0.75] * 6, abs=0.25
         )
+
+
+def test_the_margin_model_is_the_last_row_of_table_6_and_a_curve_of_figure_3(study):
+    _, results, _ = study
+    row = results["comparison"].tables[0].rows[-1]
+    assert row[:3] == ("Margin model", "ours", 80)
+    # From 80 legs it knows more than chance: it starts from a physical estimate.
+    assert float(row[3].split(" ± ")[0]) > 0.75
+    sizes = [row[1] for row in results["data_size"].tables[0].rows if row[0] == "Margin model"]
+    assert sizes == [80]
+    assert results["comparison"].tables[1].columns[-1] == "Margin model"
+
+
+def test_a_study_that_was_done_before_the_margin_model_gets_only_its_cells(study, tmp_path):
+    tiny, results, _ = study
+    shutil.copytree(tiny.out, tmp_path / "out")
+    cells = tmp_path / "out" / "cells"
+    for path in cells.glob("margin-*.json"):
+        path.unlink()
+    others = set(cells.glob("*.json"))
+    lines: list[str] = []
+    again = run_study(dataclasses.replace(tiny, out=cells.parent), ["comparison"], lines.append)
+    assert {path.name.split("-")[0] for path in set(cells.glob("*.json")) - others} == {"margin"}
+    assert again["comparison"].tables[1] == results["comparison"].tables[1]
+
+
+def test_the_margin_model_learns_the_same_wherever_it_is_computed(context):
+    one = run_margin(context, 60, 0)
+    elsewhere = dataclasses.replace(context, threads=2)
+    assert run_margin(elsewhere, 60, 0) == one
+    assert context.cells.computed == 1
+    assert one.legs == 60
+    epochs = [margin_recipe(context, legs, 0).epochs for legs in (1000, 100_000, 400_000)]
+    assert epochs == sorted(epochs, reverse=True)
 
 
 def test_an_optimisation_reports_all_trials_of_both_kinds(study):

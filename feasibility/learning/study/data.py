@@ -29,6 +29,8 @@ class StudyData:
 
     Attributes
     ----------
+    dataset : Dataset
+        The labelled rows.
     legs : Legs
         n legs.
     X : (n, k) float64
@@ -49,6 +51,7 @@ class StudyData:
         Where the legs came from, for the report.
     """
 
+    dataset: Dataset
     legs: Legs
     X: NDArray[np.float64]
     y: NDArray[np.bool_]
@@ -106,6 +109,7 @@ class StudyData:
         folds = pair_folds(pairs[pool], N_FOLDS, np.random.default_rng([seed, _FOLDS]))
         catalogue = dataset.metadata["catalogue"]
         return cls(
+            dataset=rows,
             legs=rows.legs,
             X=X,
             y=y,

@@ -8,6 +8,7 @@ from feasibility.learning.study import paper_values
 from feasibility.learning.study.context import Context
 from feasibility.learning.study.figures import COLOURS, NAMES, error_line, panels
 from feasibility.learning.study.fit import Fit, Outcome, over_seeds, run_fit
+from feasibility.learning.study.margin import COMPARED_WITH, MARGIN, margin_sizes, run_margin
 from feasibility.learning.study.result import Result, Table
 
 if TYPE_CHECKING:
@@ -43,12 +44,17 @@ def run(context: Context) -> Result:
             samples = fits[0].feasible + fits[0].infeasible
             if samples not in curves[model]:
                 curves[model][samples] = [run_fit(context, fit) for fit in fits]
+    curves[MARGIN] = {}
+    for size in margin_sizes(tuple(curves.get(COMPARED_WITH, ()))):
+        curves[MARGIN][size] = [
+            run_margin(context, size, seed) for seed in range(preset.data_size_seeds)
+        ]
     rows = []
     for model, curve in curves.items():
         for samples, outcomes in curve.items():
             accuracy = over_seeds(outcomes, "accuracy")
             area = over_seeds(outcomes, "auc")
-            published = paper_values.FIGURE_3[model].get(samples)
+            published = paper_values.FIGURE_3.get(model, {}).get(samples)
             seconds = float(np.mean([outcome.fit_seconds for outcome in outcomes]))
             rows.append(
                 (NAMES[model], samples, len(outcomes), *accuracy, published, *area, seconds)
@@ -74,8 +80,9 @@ def run(context: Context) -> Result:
         title=f"Where the curves flatten: within {_ELBOW_GAIN:g} of the accuracy at the last size",
         columns=("model", "ours", "paper"),
         rows=tuple(
-            (NAMES[model], _elbow(curve), paper_values.FIGURE_3_ELBOW[model])
+            (NAMES[model], _elbow(curve), paper_values.FIGURE_3_ELBOW.get(model))
             for model, curve in curves.items()
+            if curve
         ),
     )
     result = Result(
@@ -84,7 +91,9 @@ def run(context: Context) -> Result:
         about=(
             "Every model learns from balanced draws of growing size; the draws of one seed are "
             "nested. Error bars are one standard deviation over the seeds, which change the draw "
-            "and the training. The test set is always the same."
+            "and the training. The test set is always the same. The margin model "
+            "(docs/classifier.md) learns m* of the same draws, of which it holds out its own "
+            "validation and calibration legs."
         ),
         findings=tuple(_findings(curves)),
         tables=(table, elbows),
@@ -144,6 +153,29 @@ def _findings(curves: Curves) -> list[str]:
             else:
                 text += ": no sign of falling to the paper's " + f"{target:.4f}."
             findings.append(text)
+    findings += _margin_findings(curves.get(MARGIN, {}), network)
+    return findings
+
+
+def _margin_findings(
+    margin: dict[int, list[Outcome]], network: dict[int, list[Outcome]]
+) -> list[str]:
+    published = paper_values.TABLE_6["dnn1"][0]
+    means = {size: over_seeds(outcomes, "accuracy")[0] for size, outcomes in margin.items()}
+    reached = [size for size, mean in means.items() if mean >= published]
+    findings = []
+    if reached:
+        size = min(reached)
+        findings.append(
+            f"The margin model is at {means[size]:.4f} with {size} legs; the paper's network is "
+            f"at {published:.4f} with {paper_values.TABLE_6_SAMPLES['dnn1']}."
+        )
+    if means:
+        size = max(means)
+        findings.append(
+            f"From the same {size} legs the margin model errs on {1.0 - means[size]:.2%} of the "
+            f"test legs, DNN1 on {1.0 - over_seeds(network[size], 'accuracy')[0]:.2%}."
+        )
     return findings
 
 
@@ -159,7 +191,7 @@ def _draw(curves: Curves) -> "Figure":
             color=COLOURS[model],
             label=NAMES[model],
         )
-        published = paper_values.FIGURE_3[model]
+        published = paper_values.FIGURE_3.get(model, {})
         axes.plot(
             list(published),
             list(published.values()),

@@ -15,6 +15,7 @@ COLOURS: Final = {
     "tree": "#CC79A7",
     "dnn1": "#0072B2",
     "dnn2": "#D55E00",
+    "margin": "#000000",
 }
 """Colour of each model in every figure."""
 
@@ -25,8 +26,9 @@ NAMES: Final = {
     "tree": "Tree",
     "dnn1": "DNN1",
     "dnn2": "DNN2",
+    "margin": "Margin model",
 }
-"""Name of each model as the paper prints it."""
+"""Name of each model, as the paper prints it; the margin model is ours."""
 
 
 def panels(
