@@ -11,19 +11,20 @@ from numpy.typing import NDArray
 
 from feasibility import AllOf, Pruner
 from feasibility.orbits import OrbitalNeighbours
-from feasibility.orbits.lambert import lambert
+from feasibility.pruners.predictor import LegPredictor, lambert_final_mass
 from seqsearch.counters import RankCounters
 from seqsearch.deadline import Deadline
 from seqsearch.expansion import Candidates, expand, reached
+from seqsearch.frontier import Frontier, make_frontier
 from seqsearch.nodes import Nodes
-from seqsearch.optimisation import LegOptimiser, Optimised
-from seqsearch.problem import Problem
+from seqsearch.optimisation import LegOptimiser, Optimised, SolvedHops
 from seqsearch.pruner_spec import parse_pruner
 from seqsearch.ranking import Ranking, TimePropellantRanking
-from seqsearch.selection import select
 from seqsearch.settings import SearchSettings
 from seqsearch.starts import dense_starts
+from seqsearch.state import SearchState
 from seqsearch.tour import Tour
+from seqsearch.tour_problem import Hops, TourProblem
 from seqsearch.tree import FlownLeg, SearchTree
 
 
@@ -51,26 +52,31 @@ class SearchResult:
 
 
 def search(
-    problem: Problem,
+    problem: TourProblem,
     *,
     pruner: Pruner | None = None,
+    predictor: LegPredictor | None = None,
     beam_width: int | None = None,
     settings: SearchSettings | None = None,
     ranking: Ranking | None = None,
     rng: np.random.Generator | None = None,
     executor: Executor | None = None,
     time_limit_s: float | None = None,
-    on_rank: Callable[[RankCounters, Tour], None] | None = None,
+    resume: SearchState | None = None,
+    on_rank: Callable[[SearchState], None] | None = None,
+    on_pruned: Callable[[Hops], None] | None = None,
 ) -> SearchResult:
     """Search for the tour with the most visits.
 
     Parameters
     ----------
-    problem : Problem
+    problem : TourProblem
         What to solve.
     pruner : Pruner, optional
         Which candidate legs are worth optimising; default: the one that
         `settings` name.
+    predictor : LegPredictor, optional
+        Predicts margins and final masses, by which candidates are ordered.
     beam_width : int, optional
         Overrides ``settings.beam_width``.
     settings : SearchSettings, optional
@@ -85,8 +91,13 @@ def search(
     time_limit_s : float, optional
         Stop after this wall-clock time with the best tour so far. Passes
         beyond ``settings.passes`` are then run until the time is up.
+    resume : SearchState, optional
+        Go on from here. The state is changed.
     on_rank : callable, optional
-        Called after each rank with its counters and the best tour so far.
+        Called with the state after each rank and before the first one of a
+        pass; the state changes afterwards.
+    on_pruned : callable, optional
+        Called with each batch of hops that were proposed and pruned.
 
     Returns
     -------
@@ -103,89 +114,112 @@ def search(
     settings = settings or SearchSettings()
     if beam_width is not None:
         settings = settings.with_(beam_width=beam_width)
+    rng = rng or np.random.default_rng(0)
+    state = resume or SearchState(settings=settings)
+    if resume is not None:
+        rng.bit_generator.state = resume.rng_state
     return _Search(
         problem,
         settings,
         pruner or parse_pruner(settings.pruner),
+        predictor,
         ranking or TimePropellantRanking(settings.time_weight, settings.propellant_weight),
-        LegOptimiser(settings, executor),
+        LegOptimiser(executor),
         Deadline(time_limit_s),
+        state,
+        rng,
         on_rank,
-    ).run(rng or np.random.default_rng(0), endless=time_limit_s is not None)
+        on_pruned,
+    ).run(endless=time_limit_s is not None)
 
 
 @final
 class _Search:
-    """The state of one search: tree, counters and best node so far."""
+    """A search that runs: what it was given, and its state."""
 
     def __init__(
         self,
-        problem: Problem,
+        problem: TourProblem,
         settings: SearchSettings,
         pruner: Pruner,
+        predictor: LegPredictor | None,
         ranking: Ranking,
         optimiser: LegOptimiser,
         deadline: Deadline,
-        on_rank: Callable[[RankCounters, Tour], None] | None,
+        state: SearchState,
+        rng: np.random.Generator,
+        on_rank: Callable[[SearchState], None] | None,
+        on_pruned: Callable[[Hops], None] | None,
     ) -> None:
         self._problem = problem
         self._settings = settings
         self._pruner = pruner if isinstance(pruner, AllOf) else AllOf(pruner)
+        self._predictor = predictor
         self._ranking = ranking
         self._optimiser = optimiser
         self._deadline = deadline
+        self._state = state
+        self._rng = rng
         self._on_rank = on_rank
+        self._on_pruned = on_pruned
         self._neighbours = OrbitalNeighbours(
             problem.catalogue, reference_tof_days=settings.reference_tof_days
         )
-        self._tree = SearchTree()
-        self._counters: list[RankCounters] = []
-        self._best_node = -1
-        self._best_key = (-1, 0.0)
+        self._spent_before = state.spent_s
+        self._began = time.monotonic()
 
-    def run(self, rng: np.random.Generator, *, endless: bool) -> SearchResult:
+    def run(self, *, endless: bool) -> SearchResult:
+        state = self._state
         stopped = "complete"
-        pass_number = 0
         try:
-            while (endless or pass_number < self._settings.passes) and not self._deadline.passed():
-                pass_number += 1
-                self._run_pass(pass_number, rng)
+            if state.waiting is not None:
+                self._run_pass(state.waiting)
+            while (
+                endless or state.pass_number < self._settings.passes
+            ) and not self._deadline.passed():
+                state.pass_number += 1
+                self._run_pass(self._start_nodes())
         except KeyboardInterrupt:
             stopped = "interrupted"
         if stopped == "complete" and self._deadline.passed():
             stopped = "time limit"
-        return SearchResult(self._best_tour(), self._tree, self._counters, stopped)
+        return SearchResult(self._best_tour(), state.tree, state.counters, stopped)
 
-    def _run_pass(self, pass_number: int, rng: np.random.Generator) -> None:
-        nodes = self._start_nodes(rng)
-        while len(nodes) and not self._deadline.passed():
-            counters = RankCounters(pass_number=pass_number, rank=nodes.rank + 1, nodes=len(nodes))
+    def _run_pass(self, nodes: Nodes) -> None:
+        """Run a pass from its starts, or go on with one."""
+        state = self._state
+        frontier = make_frontier(state.settings, self._problem, self._ranking)
+        frontier.push(nodes)
+        while len(nodes := frontier.pop()) and not self._deadline.passed():
+            counters = RankCounters(
+                pass_number=state.pass_number, rank=int(nodes.depth.max()) + 1, nodes=len(nodes)
+            )
             start = time.perf_counter()
             candidates = self._prune(nodes, counters)
             optimised = self._optimise(nodes, candidates, counters)
-            nodes = self._next_rank(nodes, candidates, optimised)
-            counters.kept = len(nodes)
+            self._advance(frontier, nodes, candidates, optimised, counters)
             counters.seconds = time.perf_counter() - start
-            self._counters.append(counters)
-            if self._on_rank is not None:
-                self._on_rank(counters, self._best_tour())
+            state.counters.append(counters)
+            self._report(frontier)
+        state.waiting = None
 
-    def _start_nodes(self, rng: np.random.Generator) -> Nodes:
-        rows, epochs = dense_starts(self._problem, self._neighbours, self._settings, rng)
-        m0 = self._problem.m0
+    def _report(self, frontier: Frontier) -> None:
+        state = self._state
+        state.waiting = frontier.waiting()
+        state.rng_state = dict(self._rng.bit_generator.state)
+        state.spent_s = self._spent_before + time.monotonic() - self._began
+        if self._on_rank is not None:
+            self._on_rank(state)
+
+    def _start_nodes(self) -> Nodes:
+        state = self._state
+        rows, epochs = dense_starts(self._problem, self._neighbours, state.settings, self._rng)
+        nodes = self._problem.start_nodes(rows, epochs)
         ids = [
-            self._tree.add_start(int(row), float(t), m0)
-            for row, t in zip(rows, epochs, strict=True)
+            state.tree.add_start(int(row), float(t), float(mass))
+            for row, t, mass in zip(nodes.row, nodes.t_first_mjd2000, nodes.mass, strict=True)
         ]
-        nodes = Nodes(
-            row=rows,
-            t_ready_mjd2000=epochs,
-            t_arr_mjd2000=epochs,
-            t_first_mjd2000=epochs,
-            mass=np.full(len(rows), m0),
-            visited=rows[:, None],
-            tree_id=np.asarray(ids, dtype=np.int64),
-        )
+        nodes = replace(nodes, tree_id=np.asarray(ids, dtype=np.int64))
         self._note_best(nodes)
         return nodes
 
@@ -193,19 +227,29 @@ class _Search:
         """Propose candidates and return those that every pruner keeps."""
         kept = []
         clock = time.perf_counter()
-        for block in expand(self._problem, nodes, self._neighbours, self._settings):
+        for block in expand(self._problem, nodes, self._neighbours, self._state.settings):
             counters.proposed += len(block)
             counters.seconds_expand += time.perf_counter() - clock
             clock = time.perf_counter()
-            mask, pruned = self._pruner.keep_with_counts(block.legs)
-            counters.count_pruned(pruned)
+            mask = self._keep(block.hops, counters)
             counters.seconds_prune += time.perf_counter() - clock
             clock = time.perf_counter()
+            if self._on_pruned is not None and not mask.all():
+                self._on_pruned(block.hops.take(~mask))
             if mask.any():
                 kept.append(block.take(mask))
             if self._deadline.passed():
                 break
         return Candidates.concatenate(kept) if kept else None
+
+    def _keep(self, hops: Hops, counters: RankCounters) -> NDArray[np.bool_]:
+        """Return (n,) bool, where all stages survive; each stage is asked about survivors only."""
+        mask = np.ones(len(hops), dtype=np.bool_)
+        for legs in hops.stages:
+            rows = np.flatnonzero(mask)
+            mask[rows], pruned = self._pruner.keep_with_counts(legs.take(rows))
+            counters.count_pruned(pruned)
+        return mask
 
     def _optimise(
         self, nodes: Nodes, candidates: Candidates | None, counters: RankCounters
@@ -214,73 +258,89 @@ class _Search:
             return None
         clock = time.perf_counter()
         promise = self._promise(nodes, candidates)
-        optimised = self._optimiser.run(candidates, promise, self._deadline)
-        counters.optimised = optimised.n_optimised
+        optimised = self._optimiser.run(candidates, promise, self._state.settings, self._deadline)
+        counters.optimised = optimised.n_hops
         counters.feasible = len(optimised.candidate)
+        self._state.solves += optimised.n_legs
         counters.seconds_optimise = time.perf_counter() - clock
         return optimised
 
     def _promise(self, nodes: Nodes, candidates: Candidates) -> NDArray[np.float64]:
-        """Predict the score of the node that each leg leads to.
-
-        The propellant is that of the zero-revolution Lambert arc, and no more
-        than what the engine can burn in the time of flight.
-        """
-        legs = candidates.legs
-        v_dep, v_arr = lambert(legs.rv_dep[:, :3], legs.rv_arr[:, :3], legs.tof_s, max_revs=0)
-        delta_v = np.linalg.norm(v_dep[:, 0] - legs.rv_dep[:, 3:], axis=1) + np.linalg.norm(
-            v_arr[:, 0] - legs.rv_arr[:, 3:], axis=1
-        )
-        burnt = legs.m0 * -np.expm1(-np.nan_to_num(delta_v, nan=np.inf) / legs.exhaust_velocity)
-        most = legs.thrust / legs.exhaust_velocity * legs.tof_s
-        m_final = np.maximum(legs.m0 - np.minimum(burnt, most), legs.m_dry)
+        """Predict the score of the node that each hop leads to."""
+        last = candidates.hops.stages[-1]
+        predict = lambert_final_mass if self._predictor is None else self._predictor.final_mass
         return self._ranking.score(
-            reached(self._problem, nodes, candidates, m_final), self._problem
+            reached(self._problem, nodes, candidates, predict(last)), self._problem
         )
 
-    def _next_rank(
-        self, nodes: Nodes, candidates: Candidates | None, optimised: Optimised | None
-    ) -> Nodes:
-        """Select the best of the nodes that were reached and hang them into the tree."""
-        if candidates is None or optimised is None or len(optimised.candidate) == 0:
-            return nodes.take(np.zeros(0, dtype=np.intp))
-        flown = candidates.take(optimised.candidate)
-        found = reached(self._problem, nodes, flown, optimised.solutions.m_final)
-        scores = self._ranking.score(found, self._problem)
-        chosen = select(scores, found, flown.parent, self._settings)
-        tree_id = found.tree_id.copy()
-        for i in chosen:
-            leg = _flown_leg(flown, optimised, int(i), nodes)
-            tree_id[i] = self._tree.add_leg(int(nodes.tree_id[flown.parent[i]]), leg)
-        kept = replace(found, tree_id=tree_id).take(chosen)
+    def _advance(
+        self,
+        frontier: Frontier,
+        nodes: Nodes,
+        candidates: Candidates | None,
+        optimised: Optimised | None,
+        counters: RankCounters,
+    ) -> None:
+        """Hang the nodes that go on into the tree and into the frontier."""
+        if candidates is None or optimised is None or optimised.solved is None:
+            return
+        flown, solved = candidates.take(optimised.candidate), optimised.solved
+        found = reached(self._problem, nodes, flown, solved.solutions[-1].m_final)
+        chosen = frontier.admit(found)
+        chains = _flown_legs(self._problem, flown.take(chosen), solved.take(chosen))
+        ids = [
+            self._state.tree.add_hop(int(parent), chain)
+            for parent, chain in zip(found.parent_id[chosen], chains, strict=True)
+        ]
+        kept = replace(found.take(chosen), tree_id=np.asarray(ids, dtype=np.int64))
+        frontier.push(kept)
+        counters.kept = len(kept)
         self._note_best(kept)
-        return kept
 
     def _note_best(self, nodes: Nodes) -> None:
         """Remember the deepest node; among equally deep ones that of the best score."""
         if len(nodes) == 0:
             return
-        scores = self._ranking.score(nodes, self._problem)
+        deepest = nodes.take(nodes.depth == nodes.depth.max())
+        scores = self._ranking.score(deepest, self._problem)
         best = int(np.argmin(scores))
-        if (nodes.rank, -scores[best]) > self._best_key:
-            self._best_key = (nodes.rank, -float(scores[best]))
-            self._best_node = int(nodes.tree_id[best])
+        key = (int(deepest.depth[0]), -float(scores[best]))
+        if key > self._state.best_key:
+            self._state.best_key = key
+            self._state.best_node = int(deepest.tree_id[best])
 
     def _best_tour(self) -> Tour:
-        return Tour.from_tree(self._problem, self._tree, self._best_node)
+        return Tour.from_tree(self._problem, self._state.tree, self._state.best_node)
 
 
-def _flown_leg(flown: Candidates, optimised: Optimised, i: int, nodes: Nodes) -> FlownLeg:
-    legs = flown.legs
-    assert legs.t_dep_mjd2000 is not None
-    return FlownLeg(
-        dep_row=int(nodes.row[flown.parent[i]]),
-        arr_row=int(flown.target[i]),
-        t_dep_mjd2000=float(legs.t_dep_mjd2000[i]),
-        tof_days=float(legs.tof_days[i]),
-        m0=float(legs.m0[i]),
-        m_final=float(optimised.solutions.m_final[i]),
-        m_star=float(optimised.m_star[i]),
-        throttles=optimised.solutions.throttles[i],
-        mismatch=float(optimised.solutions.mismatch[i]),
+def _flown_legs(
+    problem: TourProblem, flown: Candidates, solved: SolvedHops
+) -> list[tuple[FlownLeg, ...]]:
+    """Return the legs of each hop."""
+    chains: list[tuple[FlownLeg, ...]] = [() for _ in range(len(flown))]
+    stages = zip(
+        flown.hops.stages, flown.hops.dropped_kg, solved.m_star, solved.solutions, strict=True
     )
+    for legs, dropped, m_star, solution in stages:
+        assert legs.t_dep_mjd2000 is not None
+        assert legs.dep_id is not None
+        assert legs.arr_id is not None
+        dep_row = problem.catalogue.rows_of(legs.dep_id)
+        arr_row = problem.catalogue.rows_of(legs.arr_id)
+        for i in range(len(legs)):
+            leg = FlownLeg(
+                dep_row=int(dep_row[i]),
+                arr_row=int(arr_row[i]),
+                rv_dep=legs.rv_dep[i],
+                rv_arr=legs.rv_arr[i],
+                t_dep_mjd2000=float(legs.t_dep_mjd2000[i]),
+                tof_days=float(legs.tof_days[i]),
+                m0=float(solution.m0[i]),
+                m_final=float(solution.m_final[i]),
+                m_star=float(m_star[i]),
+                dropped=float(dropped[i]),
+                throttles=solution.throttles[i],
+                mismatch=float(solution.mismatch[i]),
+            )
+            chains[i] += (leg,)
+    return chains

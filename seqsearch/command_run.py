@@ -16,6 +16,7 @@ from seqsearch.counters import RankCounters
 from seqsearch.plots import plot_tour
 from seqsearch.pruner_spec import parse_pruner
 from seqsearch.run_folder import RunFolder
+from seqsearch.state import SearchState
 from seqsearch.tour import Tour
 
 
@@ -52,12 +53,11 @@ def run_search(
         f"{problem.name}: {len(problem.catalogue)} bodies from {problem.catalogue.source}, "
         f"seed {seed}, writing to {folder.path}"
     )
-    records: list[RankCounters] = []
 
-    def on_rank(counters: RankCounters, tour: Tour) -> None:
-        records.append(counters)
-        folder.write(tour, records)
-        print(_rank_line(counters, tour), flush=True)
+    def on_rank(state: SearchState) -> None:
+        tour = Tour.from_tree(problem, state.tree, state.best_node)
+        folder.write(tour, state.counters)
+        print(_rank_line(state.counters[-1], tour), flush=True)
 
     with worker_pool(workers or os.cpu_count() or 1) as executor:
         if config.search.solver == "fast":

@@ -1,6 +1,7 @@
-"""`Nodes`: the nodes of one rank of the beam, as a struct of arrays."""
+"""`Nodes`: nodes of the search, as a struct of arrays."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
 from typing import Self, final
 
 import numpy as np
@@ -10,52 +11,91 @@ from numpy.typing import NDArray
 @final
 @dataclass(frozen=True, eq=False)
 class Nodes:
-    """Nodes of one rank: where each spacecraft is, since when, and with what mass.
+    """Nodes: where each spacecraft is, since when, and with what mass.
 
-    With n the number of nodes and d the rank (legs flown so far).
+    With n the number of nodes and w the width of the table of visits, more
+    than the greatest depth.
 
     Attributes
     ----------
     row : (n,) intp
         Catalogue row of the body at which the spacecraft is.
+    depth : (n,) int64
+        Visits after the start.
     t_ready_mjd2000 : (n,) float64
         Earliest epoch of the next departure: arrival plus stay, or the start epoch.
     t_arr_mjd2000 : (n,) float64
-        Epoch of the arrival; the start epoch at rank 0.
+        Epoch of the arrival; the start epoch at depth 0.
     t_first_mjd2000 : (n,) float64
-        Epoch of the tour's first departure; the start epoch at rank 0.
+        Epoch of the tour's first departure; the start epoch at depth 0.
     mass : (n,) float64, kg
-        Spacecraft mass.
-    visited : (n, d + 1) intp
-        Catalogue rows of the bodies in order of visit, the present one last.
+        Spacecraft mass, after what was dropped on arrival.
+    visited : (n, w) intp
+        Catalogue rows of the bodies in order of visit, the present one at
+        position `depth`, then -1.
     tree_id : (n,) int64
-        Id of the node in the search tree.
+        Id of the node in the search tree; -1 for a node that is not in it.
+    parent_id : (n,) int64
+        Id of the node's parent in the search tree; -1 for a start.
     """
 
     row: NDArray[np.intp]
+    depth: NDArray[np.int64]
     t_ready_mjd2000: NDArray[np.float64]
     t_arr_mjd2000: NDArray[np.float64]
     t_first_mjd2000: NDArray[np.float64]
     mass: NDArray[np.float64]
     visited: NDArray[np.intp]
     tree_id: NDArray[np.int64]
+    parent_id: NDArray[np.int64]
 
     def __len__(self) -> int:
         return len(self.row)
 
-    @property
-    def rank(self) -> int:
-        """Legs flown so far."""
-        return int(self.visited.shape[1]) - 1
+    def take(self, index: NDArray[np.intp] | NDArray[np.bool_]) -> Self:
+        """Return the nodes at the given positions (indices or a mask)."""
+        return type(self)(**{f.name: getattr(self, f.name)[index] for f in fields(self)})
 
-    def take(self, index: NDArray[np.intp]) -> Self:
-        """Return the nodes at the given positions."""
-        return type(self)(
-            row=self.row[index],
-            t_ready_mjd2000=self.t_ready_mjd2000[index],
-            t_arr_mjd2000=self.t_arr_mjd2000[index],
-            t_first_mjd2000=self.t_first_mjd2000[index],
-            mass=self.mass[index],
-            visited=self.visited[index],
-            tree_id=self.tree_id[index],
+    @classmethod
+    def at_start(
+        cls, rows: NDArray[np.intp], t_mjd2000: NDArray[np.float64], mass: NDArray[np.float64]
+    ) -> Self:
+        """Return n start nodes at bodies and epochs, not yet in the tree."""
+        n = len(rows)
+        return cls(
+            row=rows,
+            depth=np.zeros(n, dtype=np.int64),
+            t_ready_mjd2000=t_mjd2000,
+            t_arr_mjd2000=t_mjd2000,
+            t_first_mjd2000=t_mjd2000,
+            mass=mass,
+            visited=rows[:, None],
+            tree_id=np.full(n, -1, dtype=np.int64),
+            parent_id=np.full(n, -1, dtype=np.int64),
         )
+
+    @classmethod
+    def concatenate(cls, parts: "Sequence[Nodes]") -> Self:
+        """Return the nodes of all parts, at least one, in order."""
+        width = max(part.visited.shape[1] for part in parts)
+        columns = {
+            f.name: np.concatenate([getattr(part, f.name) for part in parts])
+            for f in fields(cls)
+            if f.name != "visited"
+        }
+        return cls(**columns, visited=np.concatenate([_padded(p.visited, width) for p in parts]))
+
+    def extended_visits(
+        self, parent: NDArray[np.intp], target: NDArray[np.intp]
+    ) -> NDArray[np.intp]:
+        """Return the (m, w') visits of children: those of each `parent`, then its `target`."""
+        depth = self.depth[parent] + 1
+        width = max(self.visited.shape[1], int(depth.max(initial=0)) + 1)
+        visited = _padded(self.visited[parent], width)
+        visited[np.arange(len(parent)), depth] = target
+        return visited
+
+
+def _padded(visited: NDArray[np.intp], width: int) -> NDArray[np.intp]:
+    """Return a copy with columns of -1 appended."""
+    return np.pad(visited, ((0, 0), (0, width - visited.shape[1])), constant_values=-1)

@@ -6,9 +6,11 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility import InputError, Spacecraft
+from feasibility import InputError, Legs, Spacecraft
 from feasibility.constants import MJD2000_MJD
 from feasibility.orbits import Catalogue
+from seqsearch.nodes import Nodes
+from seqsearch.tour_problem import Hops
 
 
 @final
@@ -108,3 +110,33 @@ class Problem:
         if not self.start_ids:
             return np.arange(len(self.catalogue))
         return np.asarray(self.catalogue.rows_of(np.asarray(self.start_ids)), dtype=np.intp)
+
+    def start_nodes(self, rows: NDArray[np.intp], t_mjd2000: NDArray[np.float64], /) -> Nodes:
+        """Return the (k,) nodes at bodies and epochs, with full tanks."""
+        return Nodes.at_start(rows, t_mjd2000, np.full(len(rows), self.m0))
+
+    def hops(
+        self,
+        nodes: Nodes,
+        parent: NDArray[np.intp],
+        target: NDArray[np.intp],
+        t_dep_mjd2000: NDArray[np.float64],
+        tof_days: NDArray[np.float64],
+        /,
+    ) -> Hops:
+        """Return the (k,) hops, each a single leg; see `TourProblem.hops`."""
+        catalogue, craft = self.catalogue, self.spacecraft
+        row = nodes.row[parent]
+        legs = Legs(
+            rv_dep=catalogue.states_at(row, t_dep_mjd2000),
+            rv_arr=catalogue.states_at(target, t_dep_mjd2000 + tof_days),
+            tof_days=tof_days,
+            m0=nodes.mass[parent],
+            thrust=craft.thrust,
+            isp=craft.isp,
+            m_dry=craft.m_dry,
+            t_dep_mjd2000=t_dep_mjd2000,
+            dep_id=catalogue.ids[row],
+            arr_id=catalogue.ids[target],
+        )
+        return Hops((legs,), (np.zeros(len(legs)),))

@@ -7,18 +7,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seqsearch.nodes import Nodes
-from seqsearch.problem import Problem
+from seqsearch.tour_problem import TourProblem
 
 
 @runtime_checkable
 class Ranking(Protocol):
-    """Scores the nodes of one rank; the smallest scores go on.
+    """Scores nodes that compete with each other; the smallest scores go on.
 
-    The contract: one finite score a node, row-wise (a node's score depends on
-    that node and the problem alone) and pure.
+    The contract: one finite score a node, and pure. A node's score may depend
+    on the other nodes of the batch, as a Pareto rank does, but not on the order
+    in which they come. A batch of a single node is legal.
     """
 
-    def score(self, nodes: Nodes, problem: Problem, /) -> NDArray[np.float64]:
+    def score(self, nodes: Nodes, problem: TourProblem, /) -> NDArray[np.float64]:
         """Return (n,) float64, smaller is better."""
         ...
 
@@ -38,7 +39,7 @@ class TimePropellantRanking:
     time_weight: float = 1.0
     propellant_weight: float = 0.6
 
-    def score(self, nodes: Nodes, problem: Problem, /) -> NDArray[np.float64]:
+    def score(self, nodes: Nodes, problem: TourProblem, /) -> NDArray[np.float64]:
         """Return (n,) float64, smaller is better."""
         elapsed = (nodes.t_arr_mjd2000 - nodes.t_first_mjd2000) / problem.max_duration_days
         used = (problem.m0 - nodes.mass) / (problem.m0 - problem.spacecraft.m_dry)

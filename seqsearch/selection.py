@@ -12,7 +12,6 @@ from seqsearch.settings import SearchSettings
 def select(
     scores: NDArray[np.float64],
     nodes: Nodes,
-    parent: NDArray[np.intp],
     settings: SearchSettings,
 ) -> NDArray[np.intp]:
     """Return the positions of the nodes that go on, best first.
@@ -29,8 +28,6 @@ def select(
         Smaller is better.
     nodes : Nodes
         The n nodes.
-    parent : (n,) intp
-        Each node's parent.
     settings : SearchSettings
         `beam_width` and the caps.
 
@@ -43,7 +40,7 @@ def select(
     taken: list[int] = []
     counts: dict[Hashable, int] = {}
     for i in np.argsort(scores, kind="stable"):
-        by_parent = ("parent", int(parent[i]))
+        by_parent = ("parent", int(nodes.parent_id[i]))
         by_cell = ("cell", int(nodes.row[i]), int(cell[i]))
         by_set = ("set", int(nodes.row[i]), int(cell[i]), tuple(np.sort(nodes.visited[i])))
         if (

@@ -4,15 +4,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.orbits import OrbitalNeighbours, orbital_metric
-from seqsearch.problem import Problem
 from seqsearch.settings import SearchSettings
+from seqsearch.tour_problem import TourProblem
 
 _CROWD = 8
 """Neighbours that count: the distance to the eighth says how dense a neighbourhood is."""
 
 
 def dense_starts(
-    problem: Problem,
+    problem: TourProblem,
     neighbours: OrbitalNeighbours,
     settings: SearchSettings,
     rng: np.random.Generator,

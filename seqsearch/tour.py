@@ -8,7 +8,7 @@ import numpy as np
 
 from feasibility import InputError
 from feasibility.constants import DAY_S, G0, MJD2000_MJD, MU_SUN
-from seqsearch.problem import Problem
+from seqsearch.tour_problem import TourProblem
 from seqsearch.tree import FlownLeg, SearchTree
 
 FORMAT: Final = "seqsearch-tour-1"
@@ -127,7 +127,7 @@ class Tour(_Record, frozen=True, kw_only=True):
         return self.legs[-1].m_final_kg if self.legs else self.rules.m0_kg
 
     @classmethod
-    def from_tree(cls, problem: Problem, tree: SearchTree, node: int) -> Self:
+    def from_tree(cls, problem: TourProblem, tree: SearchTree, node: int) -> Self:
         """Build the tour that leads to a node of the search tree."""
         flown = tree.legs_to(node)
         last = tree.node(node)
@@ -214,7 +214,7 @@ def to_csv(tour: Tour) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _rules(problem: Problem) -> TourRules:
+def _rules(problem: TourProblem) -> TourRules:
     craft = problem.spacecraft
     return TourRules(
         name=problem.name,
@@ -230,7 +230,7 @@ def _rules(problem: Problem) -> TourRules:
     )
 
 
-def _body(problem: Problem, row: int) -> TourBody:
+def _body(problem: TourProblem, row: int) -> TourBody:
     catalogue = problem.catalogue
     a, e, i, node, argp, anomaly = (float(value) for value in catalogue.elements[row])
     return TourBody(
@@ -246,7 +246,7 @@ def _body(problem: Problem, row: int) -> TourBody:
     )
 
 
-def _leg(problem: Problem, leg: FlownLeg) -> TourLeg:
+def _leg(problem: TourProblem, leg: FlownLeg) -> TourLeg:
     return TourLeg(
         from_id=int(problem.catalogue.ids[leg.dep_row]),
         to_id=int(problem.catalogue.ids[leg.arr_row]),
@@ -259,7 +259,7 @@ def _leg(problem: Problem, leg: FlownLeg) -> TourLeg:
     )
 
 
-def _impulses(problem: Problem, leg: FlownLeg) -> tuple[Impulse, ...]:
+def _impulses(problem: TourProblem, leg: FlownLeg) -> tuple[Impulse, ...]:
     """Turn throttles into impulses in pykep's mass convention.
 
     An impulse is thrust x segment time x throttle / mass, with the mass before

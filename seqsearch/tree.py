@@ -17,10 +17,14 @@ class FlownLeg:
     ----------
     dep_row, arr_row : int
         Catalogue rows of the two bodies.
+    rv_dep, rv_arr : (6,) float64, m and m/s
+        States at departure and arrival, which need not be those of the bodies.
     t_dep_mjd2000, tof_days : float
         Departure epoch and flight time.
     m0, m_final, m_star : float, kg
         Initial, final and maximum initial mass; the margin is m_star / m0.
+    dropped : float, kg
+        Mass that is left behind at the arrival, after `m_final`.
     throttles : (s, 3) float64
         Throttle of each of the s segments.
     mismatch : float
@@ -29,11 +33,14 @@ class FlownLeg:
 
     dep_row: int
     arr_row: int
+    rv_dep: NDArray[np.float64]
+    rv_arr: NDArray[np.float64]
     t_dep_mjd2000: float
     tof_days: float
     m0: float
     m_final: float
     m_star: float
+    dropped: float
     throttles: NDArray[np.float64]
     mismatch: float
 
@@ -45,11 +52,11 @@ class FlownLeg:
 
 @final
 class SearchTree:
-    """The tree of visits. A node is a body, an epoch and a mass; an edge is a flown leg.
+    """The tree of visits. A node is a body, an epoch and a mass; an edge is a flown hop.
 
     `graph` is a `networkx.DiGraph` whose nodes carry ``row``, ``rank``,
     ``t_mjd2000`` (arrival, or start) and ``mass``, and whose edges carry
-    ``leg`` (`FlownLeg`).
+    ``legs``, a tuple of `FlownLeg`.
     """
 
     def __init__(self) -> None:
@@ -62,11 +69,12 @@ class SearchTree:
         """Add a start node and return its id."""
         return self._add(row, 0, t_mjd2000, mass)
 
-    def add_leg(self, parent: int, leg: FlownLeg) -> int:
-        """Add the node reached by a leg from `parent` and return its id."""
+    def add_hop(self, parent: int, legs: tuple[FlownLeg, ...]) -> int:
+        """Add the node reached by a chain of legs from `parent` and return its id."""
         rank = self.graph.nodes[parent]["rank"] + 1
-        node = self._add(leg.arr_row, rank, leg.t_arr_mjd2000, leg.m_final)
-        self.graph.add_edge(parent, node, leg=leg)
+        last = legs[-1]
+        node = self._add(last.arr_row, rank, last.t_arr_mjd2000, last.m_final - last.dropped)
+        self.graph.add_edge(parent, node, legs=legs)
         return node
 
     def _add(self, row: int, rank: int, t_mjd2000: float, mass: float) -> int:
@@ -75,7 +83,7 @@ class SearchTree:
         return node
 
     def rank(self, node: int) -> int:
-        """Return the number of legs that lead to a node."""
+        """Return the number of hops that lead to a node."""
         return int(self.graph.nodes[node]["rank"])
 
     def node(self, node: int) -> dict[str, Any]:
@@ -87,6 +95,6 @@ class SearchTree:
         """Return the legs from the start to a node, in order of flight."""
         legs: list[FlownLeg] = []
         while parents := list(self.graph.predecessors(node)):
-            legs.append(self.graph.edges[parents[0], node]["leg"])
+            legs.extend(reversed(self.graph.edges[parents[0], node]["legs"]))
             node = parents[0]
         return legs[::-1]

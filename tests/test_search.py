@@ -10,8 +10,7 @@ import pytest
 
 from feasibility import AllOf, KeepAll, Mima2Pruner
 from feasibility.workers import worker_pool
-from seqsearch import TimePropellantRanking, search
-from seqsearch.ranking import Ranking
+from seqsearch import search
 from tests.problems import small_problem, small_settings
 
 
@@ -46,7 +45,7 @@ def test_the_tree_is_a_forest_whose_paths_are_the_tours(result, problem):
     assert nx.is_branching(graph)
     deepest = max(nx.get_node_attributes(graph, "rank").values())
     assert deepest == len(result.tour.legs)
-    for parent, child, leg in graph.edges(data="leg"):
+    for parent, child, (leg,) in graph.edges(data="legs"):
         assert graph.nodes[parent]["row"] == leg.dep_row
         assert graph.nodes[child]["row"] == leg.arr_row
         assert graph.nodes[child]["mass"] == leg.m_final <= leg.m0
@@ -78,8 +77,8 @@ def test_a_time_limit_stops_with_the_best_so_far(problem):
 
 
 def test_an_interrupt_stops_with_the_best_so_far(problem):
-    def interrupt(record, tour):
-        if record.rank == 2:
+    def interrupt(state):
+        if state.counters[-1].rank == 2:
             raise KeyboardInterrupt
 
     stopped = search(problem, settings=small_settings(), on_rank=interrupt)
@@ -114,11 +113,6 @@ def test_each_pruner_is_counted(problem):
     assert kept_all == 0
     assert mima2 > 0
     assert counted.counters[0].kept <= 2
-
-
-def test_the_ranking_is_a_row_wise_protocol(problem):
-    ranking = TimePropellantRanking(1.0, 0.5)
-    assert isinstance(ranking, Ranking)
 
 
 def test_searches_run_side_by_side_in_threads(problem, result):

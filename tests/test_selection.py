@@ -11,19 +11,21 @@ from seqsearch.selection import select
 from seqsearch.settings import SearchSettings
 
 
-def _nodes(rows: list[int], epochs: list[float], middles: list[int]) -> Nodes:
+def _nodes(rows: list[int], epochs: list[float], middles: list[int], parents: list[int]) -> Nodes:
     n = len(rows)
     row = np.asarray(rows, dtype=np.intp)
     epoch = np.asarray(epochs)
     visited = np.column_stack([np.full(n, 1000), np.asarray(middles, dtype=np.intp), row])
     return Nodes(
         row=row,
+        depth=np.full(n, 2),
         t_ready_mjd2000=epoch,
         t_arr_mjd2000=epoch,
         t_first_mjd2000=np.zeros(n),
         mass=np.ones(n),
         visited=visited.astype(np.intp),
         tree_id=np.arange(n),
+        parent_id=np.asarray(parents, dtype=np.int64),
     )
 
 
@@ -43,13 +45,12 @@ def test_selection_keeps_every_cap_and_leaves_out_nothing_better(
     rank, beam_width, per_parent, per_cell
 ):
     rows, epochs, middles, parents, scores = rank
-    nodes = _nodes(rows, epochs, middles)
-    parent = np.asarray(parents, dtype=np.intp)
+    nodes = _nodes(rows, epochs, middles, parents)
     score = np.asarray(scores)
     settings = SearchSettings(
         beam_width=beam_width, max_per_parent=per_parent, max_per_cell=per_cell, cell_days=20.0
     )
-    chosen = select(score, nodes, parent, settings)
+    chosen = select(score, nodes, settings)
 
     def keys(i):
         cell = (rows[i], int(epochs[i] // 20.0))
@@ -68,5 +69,4 @@ def test_selection_keeps_every_cap_and_leaves_out_nothing_better(
 
 
 def test_an_empty_rank_gives_an_empty_beam():
-    nodes = _nodes([], [], [])
-    assert len(select(np.zeros(0), nodes, np.zeros(0, dtype=np.intp), SearchSettings())) == 0
+    assert len(select(np.zeros(0), _nodes([], [], [], []), SearchSettings())) == 0
