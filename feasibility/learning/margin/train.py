@@ -3,7 +3,7 @@
 import hashlib
 import itertools
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final, final
@@ -67,10 +67,10 @@ class MarginRecipe:
     Parameters
     ----------
     layers, width : int
-        Hidden layers of the net, and units of each.
+        Hidden layers of the net, and units of each; those of the model it starts from count.
     epochs : int
-        Passes over the training part; the learning rate rises for a start and falls to zero
-        along half a cosine.
+        Passes over the training part, 0 to keep the nets of the model that it starts from; the
+        learning rate rises for a start and falls to zero along half a cosine.
     batch : int
         Legs a step.
     learning_rate : float
@@ -101,7 +101,9 @@ class MarginRecipe:
     threads: int = 2
 
     def __post_init__(self) -> None:
-        for name in ("layers", "width", "epochs", "batch", "threads"):
+        if self.epochs < 0:
+            raise InputError(f"margin epochs: {self.epochs}, expected 0 or more")
+        for name in ("layers", "width", "batch", "threads"):
             if getattr(self, name) < 1:
                 raise InputError(f"margin {name}: {getattr(self, name)}, expected 1 or more")
         if self.device not in ("cpu", "cuda", "auto"):
@@ -207,10 +209,15 @@ def train_margin(
     datasets: Sequence[Dataset],
     recipe: MarginRecipe,
     *,
+    start: Artefact | None = None,
     checkpoint: Path | None = None,
     on_epoch: OnEpoch | None = None,
 ) -> Artefact:
     """Train a margin model on the legs of one or more datasets.
+
+    One that starts from another keeps the standardisation and the domain of that one, the latter
+    widened by the new legs, and its weights where training does not improve them on the
+    validation part. Calibration is always that of the new legs.
 
     Parameters
     ----------
@@ -218,6 +225,8 @@ def train_margin(
         Legs with m*; their catalogues and spacecraft may differ.
     recipe : MarginRecipe
         How to train.
+    start : Artefact, optional
+        A margin model to go on from, instead of random weights.
     checkpoint : Path, optional
         File rewritten after each epoch, from which an interrupted training goes on.
     on_epoch : callable, optional
@@ -235,6 +244,11 @@ def train_margin(
     MissingDependencyError
         The extra ``train`` is not installed.
     """
+    if start is None and not recipe.epochs:
+        raise InputError("margin epochs: 0, expected 1 or more without a model to start from")
+    first_net, first_quick = (
+        (None, None) if start is None else (start.section("model"), start.section("quick"))
+    )
     examples = MarginExamples.of(datasets)
     rng = np.random.default_rng([recipe.seed, 0])
     part = split_pairs(examples.pairs, SHARES, rng)
@@ -255,15 +269,16 @@ def train_margin(
     net = _fit(
         examples.X, error, examples.weight, learned, validation, recipe,
         layers=recipe.layers, width=recipe.width, epochs=recipe.epochs,
-        checkpoint=checkpoint, on_epoch=note,
+        start=first_net, checkpoint=checkpoint, on_epoch=note,
     )  # fmt: skip
     rough = np.isfinite(examples.quick_hint)
     quick_error = examples.target - examples.quick_hint
     quick = _fit(
         examples.X_quick, quick_error, examples.weight, learned[rough[learned]],
         validation[rough[validation]], recipe,
-        layers=_QUICK_LAYERS[0], width=_QUICK_LAYERS[1], epochs=_QUICK_EPOCHS,
-        unit=_QUICK_UNIT, heed_outliers=True,
+        layers=_QUICK_LAYERS[0], width=_QUICK_LAYERS[1],
+        epochs=_QUICK_EPOCHS if recipe.epochs else 0,
+        unit=_QUICK_UNIT, heed_outliers=True, start=first_quick,
     )  # fmt: skip
 
     # Estimates of log m* and what is wrong with them: a larger acceleration is a smaller m*.
@@ -282,6 +297,13 @@ def train_margin(
     )
     low, high = quantities.min(axis=0), quantities.max(axis=0)
     slack = _DOMAIN_SLACK * (high - low) + 1e-9
+    low, high = low - slack, high + slack
+    if start is not None and first_quick is not None:
+        domain = start.section("domain")
+        low, high = np.minimum(low, domain["low"]), np.maximum(high, domain["high"])
+        # Few calibration legs see few outliers: what was needed before is needed still.
+        known = first_quick["settled"]
+        settled = np.array([min(settled[0], known[0]), max(settled[1], known[1])])
     return Artefact(
         kind="margin",
         feature_set=FEATURE_SET,
@@ -291,8 +313,8 @@ def train_margin(
             **{f"model/{name}": array for name, array in net.items()},
             **{f"quick/{name}": array for name, array in quick.items()},
             "quick/settled": settled,
-            "domain/low": low - slack,
-            "domain/high": high + slack,
+            "domain/low": low,
+            "domain/high": high,
             **{f"calibration/{name}": array for name, array in table.items()},
             "calibration/positive_scores": boundary_scores(
                 Calibration(table), residual, expected, np.random.default_rng([recipe.seed, 1])
@@ -317,6 +339,7 @@ def train_margin(
         provenance={
             **provenance(),
             "datasets": [_record(dataset) for dataset in datasets],
+            **({} if start is None else {"start": dict(start.provenance)}),
         },
     )
 
@@ -348,14 +371,18 @@ def _fit(
     epochs: int,
     unit: float = _UNIT,
     heed_outliers: bool = False,
+    start: Mapping[str, _Array] | None = None,
     checkpoint: Path | None = None,
     on_epoch: OnEpoch = lambda _: None,
 ) -> dict[str, _Array]:
     """Train one net to predict `error`, and return its arrays for `MarginNet`.
 
     Its second output is the mean absolute error to expect or, to `heed_outliers`, the root of
-    the mean square error.
+    the mean square error. With `start`, the arrays of such a net, its weights and scales are
+    where the training begins.
     """
+    if start is not None and epochs == 0:
+        return {name: array for name, array in start.items() if name != "settled"}
     torch = load_extra("torch")
     torch.set_num_threads(recipe.threads)
     torch.manual_seed(recipe.seed)
@@ -363,6 +390,8 @@ def _fit(
     if device == "auto":
         device = "cuda" if torch.cuda.is_available() else "cpu"
     mean, std = X[learned].mean(axis=0), X[learned].std(axis=0) + 1e-6
+    if start is not None:
+        mean, std, unit = start["mean"], start["std"], float(start["unit"])
 
     def on_device(rows: NDArray[np.intp]) -> tuple[Any, Any, Any]:
         scaled = np.clip((X[rows] - mean) / std, -INPUT_LIMIT, INPUT_LIMIT)
@@ -373,14 +402,24 @@ def _fit(
     inputs, targets, weights = on_device(learned)
     held_out = on_device(validation)
     sizes = [X.shape[1], *[width] * layers]
+    if start is not None:
+        count = sum(name.startswith("weight_") for name in start)
+        sizes = [start[f"weight_{i}"].shape[1] for i in range(count)]
     modules: list[Any] = []
     for before, after in itertools.pairwise(sizes):
         modules += [torch.nn.Linear(before, after), torch.nn.SiLU()]
-    head = torch.nn.Linear(width, 2)
+    head = torch.nn.Linear(sizes[-1], 2)
     torch.nn.init.zeros_(head.bias)
     with torch.no_grad():
         head.weight.mul_(0.1)
-    network = torch.nn.Sequential(*modules, head).to(device)
+    network = torch.nn.Sequential(*modules, head)
+    linear = [part for part in network if hasattr(part, "weight")]
+    if start is not None:
+        with torch.no_grad():
+            for i, part in enumerate(linear):
+                part.weight.copy_(torch.from_numpy(start[f"weight_{i}"]))
+                part.bias.copy_(torch.from_numpy(start[f"bias_{i}"]))
+    network = network.to(device)
     optimiser = torch.optim.AdamW(
         network.parameters(), lr=recipe.learning_rate, weight_decay=_WEIGHT_DECAY
     )
@@ -405,10 +444,15 @@ def _fit(
     # A training may go on with other threads or elsewhere, though not to the last digit the same.
     settings = asdict(recipe) | {"threads": None, "device": None}
     identity = hashlib.sha256(
-        json.dumps([settings, layers, width, epochs]).encode() + error[learned].tobytes()
+        json.dumps([settings, sizes, epochs]).encode()
+        + error[learned].tobytes()
+        + (b"" if start is None else start["weight_0"].tobytes())
     ).hexdigest()
     state: dict[str, Any] = {"epoch": 0, "best_epoch": 0, "best_loss": np.inf, "history": []}
     best = {name: value.clone() for name, value in network.state_dict().items()}
+    if start is not None:
+        with torch.no_grad():
+            state["best_loss"] = float(losses_of(held_out)[0])
     if checkpoint is not None and checkpoint.exists():
         saved = torch.load(checkpoint, weights_only=True, map_location=device)
         if saved["identity"] != identity:
@@ -458,7 +502,7 @@ def _fit(
                 torch.save(content, temporary)
     network.load_state_dict(best)
     arrays = {"mean": mean, "std": std, "unit": np.array(unit)}
-    for i, part in enumerate(part for part in network if hasattr(part, "weight")):
+    for i, part in enumerate(linear):
         arrays[f"weight_{i}"] = part.weight.detach().cpu().numpy().copy()
         arrays[f"bias_{i}"] = part.bias.detach().cpu().numpy().copy()
     return arrays
