@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from feasibility import AllOf, Pruner
 from feasibility.orbits import OrbitalNeighbours
 from feasibility.pruners.predictor import LegPredictor, lambert_final_mass
+from seqsearch.audit import RankSample
 from seqsearch.counters import RankCounters
 from seqsearch.deadline import Deadline
 from seqsearch.expansion import Candidates, expand, reached
@@ -64,7 +65,6 @@ def search(
     time_limit_s: float | None = None,
     resume: SearchState | None = None,
     on_rank: Callable[[SearchState], None] | None = None,
-    on_pruned: Callable[[Hops], None] | None = None,
 ) -> SearchResult:
     """Search for the tour with the most visits.
 
@@ -96,8 +96,6 @@ def search(
     on_rank : callable, optional
         Called with the state after each rank and before the first one of a
         pass; the state changes afterwards.
-    on_pruned : callable, optional
-        Called with each batch of hops that were proposed and pruned.
 
     Returns
     -------
@@ -129,7 +127,6 @@ def search(
         state,
         rng,
         on_rank,
-        on_pruned,
     ).run(endless=time_limit_s is not None)
 
 
@@ -149,7 +146,6 @@ class _Search:
         state: SearchState,
         rng: np.random.Generator,
         on_rank: Callable[[SearchState], None] | None,
-        on_pruned: Callable[[Hops], None] | None,
     ) -> None:
         self._problem = problem
         self._settings = settings
@@ -161,7 +157,6 @@ class _Search:
         self._state = state
         self._rng = rng
         self._on_rank = on_rank
-        self._on_pruned = on_pruned
         self._neighbours = OrbitalNeighbours(
             problem.catalogue, reference_tof_days=settings.reference_tof_days
         )
@@ -195,9 +190,14 @@ class _Search:
                 pass_number=state.pass_number, rank=int(nodes.depth.max()) + 1, nodes=len(nodes)
             )
             start = time.perf_counter()
-            candidates = self._prune(nodes, counters)
+            sample = self._sample()
+            candidates = self._prune(nodes, counters, sample)
             optimised = self._optimise(nodes, candidates, counters)
-            self._advance(frontier, nodes, candidates, optimised, counters)
+            found = self._found(nodes, candidates, optimised)
+            if sample is not None:
+                self._audit(sample, frontier, nodes, candidates, found, counters)
+            self._advance(frontier, candidates, optimised, found, counters)
+            counters.cut = self._deadline.passed()
             counters.seconds = time.perf_counter() - start
             state.counters.append(counters)
             self._report(frontier)
@@ -223,7 +223,16 @@ class _Search:
         self._note_best(nodes)
         return nodes
 
-    def _prune(self, nodes: Nodes, counters: RankCounters) -> Candidates | None:
+    def _sample(self) -> RankSample | None:
+        """Return what draws this rank's audit; None without an audit or a pruner."""
+        solves = self._state.settings.audit_per_rank
+        if solves == 0 or self._pruner.pruners == ():
+            return None
+        return RankSample(self._rng, len(self._state.counters), solves, self._predictor)
+
+    def _prune(
+        self, nodes: Nodes, counters: RankCounters, sample: RankSample | None
+    ) -> Candidates | None:
         """Propose candidates and return those that every pruner keeps."""
         kept = []
         clock = time.perf_counter()
@@ -234,8 +243,8 @@ class _Search:
             mask = self._keep(block.hops, counters)
             counters.seconds_prune += time.perf_counter() - clock
             clock = time.perf_counter()
-            if self._on_pruned is not None and not mask.all():
-                self._on_pruned(block.hops.take(~mask))
+            if sample is not None:
+                sample.offer(block, mask)
             if mask.any():
                 kept.append(block.take(mask))
             if self._deadline.passed():
@@ -273,19 +282,56 @@ class _Search:
             reached(self._problem, nodes, candidates, predict(last)), self._problem
         )
 
-    def _advance(
+    def _found(
+        self, nodes: Nodes, candidates: Candidates | None, optimised: Optimised | None
+    ) -> Nodes | None:
+        """Return the nodes that the flyable hops lead to."""
+        if candidates is None or optimised is None or optimised.solved is None:
+            return None
+        flown, m_final = (
+            candidates.take(optimised.candidate),
+            optimised.solved.solutions[-1].m_final,
+        )
+        return reached(self._problem, nodes, flown, m_final)
+
+    def _audit(
         self,
+        sample: RankSample,
         frontier: Frontier,
         nodes: Nodes,
         candidates: Candidates | None,
+        found: Nodes | None,
+        counters: RankCounters,
+    ) -> None:
+        def contends(lost: Nodes) -> NDArray[np.bool_]:
+            n = 0 if found is None else len(found)
+            rivals = lost if found is None else Nodes.concatenate([found, lost])
+            return np.isin(np.arange(n, n + len(lost)), frontier.admit(rivals))
+
+        clock = time.perf_counter()
+        counters.audit = sample.solve(
+            self._problem,
+            nodes,
+            candidates,
+            self._optimiser,
+            self._state.settings.solver,
+            self._deadline,
+            contends,
+        )
+        counters.seconds_audit = time.perf_counter() - clock
+
+    def _advance(
+        self,
+        frontier: Frontier,
+        candidates: Candidates | None,
         optimised: Optimised | None,
+        found: Nodes | None,
         counters: RankCounters,
     ) -> None:
         """Hang the nodes that go on into the tree and into the frontier."""
-        if candidates is None or optimised is None or optimised.solved is None:
+        if candidates is None or optimised is None or optimised.solved is None or found is None:
             return
         flown, solved = candidates.take(optimised.candidate), optimised.solved
-        found = reached(self._problem, nodes, flown, solved.solutions[-1].m_final)
         chosen = frontier.admit(found)
         chains = _flown_legs(self._problem, flown.take(chosen), solved.take(chosen))
         ids = [

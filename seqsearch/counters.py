@@ -3,6 +3,8 @@
 from dataclasses import dataclass, field
 from typing import final
 
+from seqsearch.audit_estimate import RankAudit
+
 
 @final
 @dataclass(kw_only=True)
@@ -25,7 +27,11 @@ class RankCounters:
         Legs it could fly.
     kept : int
         Nodes kept for the next rank.
-    seconds_expand, seconds_prune, seconds_optimise, seconds : float
+    cut : bool
+        A budget ran out at this rank; it is not complete.
+    audit : RankAudit or None
+        What the audit found; None where there was none.
+    seconds_expand, seconds_prune, seconds_optimise, seconds_audit, seconds : float
         Wall-clock time of the steps and of the whole rank.
     """
 
@@ -37,9 +43,12 @@ class RankCounters:
     optimised: int = 0
     feasible: int = 0
     kept: int = 0
+    cut: bool = False
+    audit: RankAudit | None = None
     seconds_expand: float = 0.0
     seconds_prune: float = 0.0
     seconds_optimise: float = 0.0
+    seconds_audit: float = 0.0
     seconds: float = 0.0
 
     def count_pruned(self, pruned: dict[str, int]) -> None:

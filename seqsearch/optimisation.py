@@ -199,6 +199,14 @@ class LegOptimiser:
             active = still_active
         return _gather(done, n_legs, n_hops)
 
+    def solve_all(self, hops: Hops, solver: str, deadline: Deadline) -> SolvedHops | None:
+        """Optimise every one of n hops, at least one; None where the deadline came first."""
+        parts = list(self._solve(hops, np.arange(len(hops)), solver, deadline))
+        rows = np.concatenate([chunk for chunk, _ in parts]) if parts else np.zeros(0)
+        if len(rows) < len(hops):
+            return None
+        return SolvedHops.concatenate([solved for _, solved in parts]).take(np.argsort(rows))
+
     def _solve(
         self, hops: Hops, rows: NDArray[np.intp], solver: str, deadline: Deadline
     ) -> Iterator[tuple[NDArray[np.intp], SolvedHops]]:

@@ -75,7 +75,12 @@ def counters_csv(counters: Sequence[RankCounters]) -> str:
     for record in counters:
         row = asdict(record)
         pruned = row.pop("pruned")
+        audit = row.pop("audit")
         row |= {f"pruned_{name}": pruned.get(name, 0) for name in pruners}
+        for side in ("pruned", "kept"):
+            strata = [] if audit is None else audit[side]
+            row[f"audited_{side}"] = sum(stratum["solved"] for stratum in strata)
+            row[f"audited_{side}_flyable"] = sum(stratum["flyable"] for stratum in strata)
         row |= {key: round(value, 3) for key, value in row.items() if isinstance(value, float)}
         rows.append(row)
     text = io.StringIO()

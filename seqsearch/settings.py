@@ -50,6 +50,9 @@ class SearchSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
         Width of the epoch cells of `max_per_cell`.
     time_weight, propellant_weight : float
         Weights of the used shares of time and propellant in the ranking.
+    audit_per_rank : int
+        Pruned candidates of each rank that are optimised all the same, to learn what
+        pruning costs, and half as many kept ones; 0 for no audit.
     passes : int
         Beams run one after another, each with starts of its own.
     """
@@ -72,6 +75,7 @@ class SearchSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
     cell_days: _Positive = 20.0
     time_weight: Annotated[float, Meta(ge=0)] = 1.0
     propellant_weight: Annotated[float, Meta(ge=0)] = 0.6
+    audit_per_rank: Annotated[int, Meta(ge=0)] = 100
     passes: _Count = 1
 
     def __post_init__(self) -> None:
