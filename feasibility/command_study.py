@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from feasibility.errors import InputError
+from feasibility.learning.models.precision import PRECISIONS
 from feasibility.learning.study import EXPERIMENTS
 from feasibility.learning.study.presets import PRESETS, find_preset
 
@@ -74,6 +75,12 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         help="where networks are trained (default: cpu)",
     )
     parser.add_argument(
+        "--precision",
+        choices=PRECISIONS,
+        default="auto",
+        help="of a network's training (default: bfloat16 where the hardware has it, else float32)",
+    )
+    parser.add_argument(
         "--docs", metavar="FILE", help="write the report to this .md file too, figures beside it"
     )
     parser.set_defaults(run=_run)
@@ -121,4 +128,5 @@ def _settings(options: argparse.Namespace, out: Path) -> "Settings":
         workers=options.workers or cores,
         threads=options.threads or cores,
         device=options.device,
+        precision=options.precision,
     )

@@ -134,3 +134,5 @@ def test_a_balanced_subset_has_all_of_the_smaller_class_and_as_many_others():
     rows = balanced_rows(y, np.random.default_rng(0))
     assert y[rows].sum() == y.sum() == len(rows) / 2
     assert len(set(rows.tolist())) == len(rows)
+    few = balanced_rows(y, np.random.default_rng(0), most=11)
+    assert y[few].sum() == len(few) / 2 == 5

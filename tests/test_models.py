@@ -1,6 +1,7 @@
 """The five models: they learn, they repeat themselves, and arrays predict as the libraries do."""
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from feasibility import InputError, MissingDependencyError
 from feasibility.learning.metrics import auc
 from feasibility.learning.models import DNN1, DNN2, KINDS, StopTraining, make_model
 from feasibility.learning.models.dnn import DnnConfig
+from feasibility.learning.models.precision import resolve_precision
 from feasibility.learning.ranking import rank_features
 
 pytest.importorskip("sklearn")
@@ -223,6 +225,7 @@ def test_a_callback_may_stop_the_training():
         (lambda: make_model("tree", depth=3), "depth"),
         (lambda: make_model("dnn", activation="sine"), "sine"),
         (lambda: make_model("dnn", width=0), "width"),
+        (lambda: make_model("dnn", precision="float8"), "float8"),
         (lambda: make_model("knn", neighbours=0), "neighbours"),
         (lambda: make_model("knn", weighting="odd"), "weighting"),
         (lambda: make_model("svm").predict_probability(X), "not fitted"),
@@ -264,3 +267,53 @@ def test_importance_of_one_split_is_the_decrease_of_risk():
     points = np.array([[0.0, 0], [1, 0], [2, 0], [3, 0]])
     tree = DecisionTreeClassifier().fit(points, [False, False, True, True])
     assert np.allclose(tree_importance(tree.tree_, 2), [0.5, 0.0])
+
+
+def pretend(monkeypatch, **answers):
+    """Let torch answer as on other hardware, or in a version that has other names for it."""
+    monkeypatch.setattr(torch, "cpu", SimpleNamespace(**answers))
+
+
+@pytest.mark.parametrize(
+    ("answers", "expected"),
+    [
+        ({"get_capabilities": lambda: {"amx_bf16": True}}, "bfloat16"),
+        ({"get_capabilities": lambda: {"amx_bf16": False}}, "float32"),
+        ({"get_capabilities": lambda: {"neon": True}}, "float32"),
+        ({"_is_amx_tile_supported": lambda: True}, "bfloat16"),
+        ({"_is_amx_tile_supported": lambda: False}, "float32"),
+        ({}, "float32"),
+    ],
+)
+def test_the_precision_follows_the_processor_and_falls_back(monkeypatch, answers, expected):
+    pretend(monkeypatch, **answers)
+    assert resolve_precision(torch, "auto", "cpu") == expected
+    assert resolve_precision(torch, "float32", "cpu") == "float32"
+    assert resolve_precision(torch, "bfloat16", "cpu") == "bfloat16"
+
+
+@pytest.mark.parametrize(("capability", "expected"), [((9, 0), "bfloat16"), ((7, 5), "float32")])
+def test_the_precision_follows_the_gpu(monkeypatch, capability, expected):
+    monkeypatch.setattr(torch.cuda, "get_device_capability", lambda: capability)
+    assert resolve_precision(torch, "auto", "cuda") == expected
+
+
+def test_without_tiles_a_network_is_trained_in_single_precision(monkeypatch):
+    single = fitted("dnn", precision="float32")
+    pretend(monkeypatch)
+    automatic = fitted("dnn", precision="auto")
+    assert automatic.config["precision"] == "float32"
+    for name, array in single.to_arrays().items():
+        assert np.array_equal(automatic.to_arrays()[name], array)
+
+
+def test_bfloat16_rounds_the_training_but_not_what_is_kept():
+    single, rounded = (fitted("dnn", precision=p, epochs=30) for p in ("float32", "bfloat16"))
+    assert rounded.config["precision"] == "bfloat16"
+    arrays = rounded.to_arrays()
+    assert all(arrays[f"weight_{i}"].dtype == np.float32 for i in range(4))
+    assert not np.array_equal(arrays["weight_0"], single.to_arrays()["weight_0"])
+    # bfloat16 has 8 binary digits; the kept weights have more.
+    assert np.any(arrays["weight_1"].view(np.uint32) & 0xFFFF)
+    scores = [auc(Y[TEST], model.predict_probability(X[TEST])) for model in (single, rounded)]
+    assert scores[1] == pytest.approx(scores[0], abs=0.02)

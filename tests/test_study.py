@@ -44,6 +44,7 @@ TINY = dataclasses.replace(
         "dnn1": (20, 40, 80),
     },
     data_size_seeds=2,
+    margin_sizes=(80,),
     comparison=dict.fromkeys(MODELS, 80),
     comparison_seeds=2,
     n_features=(30, 60, 103),
@@ -108,6 +109,7 @@ def context(data, tmp_path):
         workers=1,
         threads=1,
         device="cpu",
+        precision="auto",
         say=lambda _: None,
     )
 
@@ -419,6 +421,7 @@ def test_presets_ask_for_what_exists(preset):
     assert preset.data_size_seeds >= 3
     assert preset.n_features_folds <= N_FOLDS
     assert max(map(max, preset.data_size.values())) < preset.legs
+    assert set(preset.margin_sizes) <= set(preset.data_size["dnn1"])
     assert set(preset.n_features) == set(paper_values.TABLE_4)
 
 

@@ -68,10 +68,24 @@ def adasyn(
     return np.asarray(X_more, dtype=np.float64), np.asarray(y_more) == 1
 
 
-def balanced_rows(y: NDArray[np.bool_], rng: np.random.Generator) -> NDArray[np.int64]:
-    """Return rows, in order, of a balanced subset: the smaller class and as many of the other."""
+def balanced_rows(
+    y: NDArray[np.bool_], rng: np.random.Generator, *, most: int | None = None
+) -> NDArray[np.int64]:
+    """Return rows, in order, of a balanced subset.
+
+    Parameters
+    ----------
+    y : (n,) bool
+        Labels.
+    rng : numpy.random.Generator
+        Draws the rows.
+    most : int, optional
+        Rows at most; by default the smaller class is taken whole, and as many of the other.
+    """
     feasible, infeasible = np.flatnonzero(y), np.flatnonzero(~y)
     size = min(len(feasible), len(infeasible))
+    if most is not None:
+        size = min(size, most // 2)
     chosen = [rng.choice(rows, size, replace=False) for rows in (feasible, infeasible)]
     return np.sort(np.concatenate(chosen)).astype(np.int64)
 

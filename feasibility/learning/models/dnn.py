@@ -2,7 +2,7 @@
 
 import itertools
 import time
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Final, Self, final
 
@@ -20,6 +20,7 @@ from feasibility.learning.models.base import (
     check_training_data,
 )
 from feasibility.learning.models.dnn_checkpoint import TrainingState, training_identity
+from feasibility.learning.models.precision import PRECISIONS, resolve_precision
 
 ACTIVATIONS: Final = ("relu", "leaky_relu", "elu")
 _ADAM_EPSILON: Final = 1e-8
@@ -60,6 +61,10 @@ class DnnConfig:
         "cpu", "cuda", or "auto" for a GPU where there is one.
     threads : int
         Threads of the processor.
+    precision : str
+        Number format of the training's matrix products: "float32", "bfloat16",
+        or "auto" for bfloat16 where processor or GPU have it, see `precision`.
+        Weights and predictions are float32 in any case.
     """
 
     layers: int = 9
@@ -76,11 +81,16 @@ class DnnConfig:
     keep_best: bool = False
     device: str = "cpu"
     threads: int = 2
+    precision: str = "auto"
 
     def __post_init__(self) -> None:
         if self.activation not in ACTIVATIONS:
             raise InputError(
                 f"dnn activation: {self.activation!r}, expected one of {', '.join(ACTIVATIONS)}"
+            )
+        if self.precision not in PRECISIONS:
+            raise InputError(
+                f"dnn precision: {self.precision!r}, expected one of {', '.join(PRECISIONS)}"
             )
         for name in ("layers", "width", "batch", "drop_period", "epochs", "threads"):
             if getattr(self, name) < 1:
@@ -106,7 +116,7 @@ class Dnn(Fitted):
 
     @property
     def config(self) -> dict[str, Any]:
-        """Hyperparameters."""
+        """Hyperparameters; once fitted, `precision` is the one that was used."""
         return asdict(self._config)
 
     @property
@@ -139,13 +149,16 @@ class Dnn(Fitted):
             Also: the checkpoint belongs to another training.
         """
         check_training_data(X, y)
+        torch = load_extra("torch")
+        device = find_device(torch, self._config.device)
+        self._config = replace(
+            self._config, precision=resolve_precision(torch, self._config.precision, device)
+        )
         config = self._config
         judged = config.patience is not None or config.keep_best
         if judged and (y_val is None or not len(y_val)):
             raise InputError("dnn patience, keep_best: they need validation rows, got none")
-        torch = load_extra("torch")
         torch.set_num_threads(config.threads)
-        device = _device(torch, config.device)
         seed = int(rng.integers(2**31))
 
         inputs = torch.as_tensor(X, dtype=torch.float32, device=device)
@@ -162,8 +175,12 @@ class Dnn(Fitted):
             lr=config.learning_rate,
             betas=(config.beta1, config.beta2),
             eps=_ADAM_EPSILON,
+            fused=True,
         )
         cross_entropy = torch.nn.functional.cross_entropy
+        rounded = torch.autocast(
+            device, dtype=torch.bfloat16, enabled=config.precision == "bfloat16"
+        )
         state = TrainingState(network, optimiser, training_identity(self.config, X, y, seed))
         if checkpoint is not None and checkpoint.exists():
             state.load(torch, checkpoint)
@@ -184,15 +201,17 @@ class Dnn(Fitted):
             right = torch.zeros((), device=device)
             network.train()
             for rows in torch.tensor_split(order, n_batches):
-                logits = network(inputs[rows])
-                loss = cross_entropy(logits, labels[rows])
+                with rounded:
+                    logits = network(inputs[rows])
+                    loss = cross_entropy(logits, labels[rows])
                 optimiser.zero_grad(set_to_none=True)
                 loss.backward()
                 optimiser.step()
                 total_loss += loss.detach() * len(rows)
                 right += (logits.detach().argmax(dim=1) == labels[rows]).sum()
 
-            val_loss, val_accuracy = _validate(torch, network, validation)
+            with rounded:
+                val_loss, val_accuracy = _validate(torch, network, validation)
             epoch = Epoch(
                 number,
                 config.rate(number),
@@ -259,7 +278,14 @@ def _arrays(network: Any, config: DnnConfig) -> dict[str, NDArray[Any]]:
     return arrays
 
 
-def _device(torch: Any, name: str) -> str:
+def find_device(torch: Any, name: str) -> str:
+    """Return "cpu" or "cuda" for one of these or "auto".
+
+    Raises
+    ------
+    InputError
+        Another name, or there is no GPU.
+    """
     if name == "auto":
         return "cuda" if torch.cuda.is_available() else "cpu"
     if name == "cuda" and not torch.cuda.is_available():

@@ -106,7 +106,7 @@ def training_identity(
     settings = {
         name: value
         for name, value in config.items()
-        if name not in ("epochs", "patience", "device", "threads")
+        if name not in ("epochs", "patience", "device", "threads", "precision")
     }
     digest = hashlib.sha256(json.dumps([settings, seed], sort_keys=True).encode())
     digest.update(np.ascontiguousarray(X).data)

@@ -11,7 +11,7 @@ from feasibility.learning.study.context import Context
 from feasibility.learning.study.data_size import balanced_fit
 from feasibility.learning.study.figures import COLOURS, NAMES, panels
 from feasibility.learning.study.fit import MARGIN_EDGES, Outcome, over_seeds, roc_grid, run_fit
-from feasibility.learning.study.margin import COMPARED_WITH, MARGIN, run_margin
+from feasibility.learning.study.margin import MARGIN, run_margin
 from feasibility.learning.study.paper_values import METRICS
 from feasibility.learning.study.result import Result, Table, Value, spread
 
@@ -32,7 +32,7 @@ def run(context: Context) -> Result:
             for seed in range(preset.comparison_seeds)
         ]
     outcomes[MARGIN] = [
-        run_margin(context, preset.comparison[COMPARED_WITH], seed)
+        run_margin(context, max(preset.margin_sizes), seed)
         for seed in range(preset.comparison_seeds)
     ]
     result = Result(
@@ -42,8 +42,8 @@ def run(context: Context) -> Result:
             "All models learn from balanced sets and are tested on the same balanced set of "
             "pairs of bodies that none of them has seen; threshold 0.5. ± is one standard "
             f"deviation over {preset.comparison_seeds} seeds. The margin model is ours "
-            "(docs/classifier.md): it learns m* of DNN1's legs, of which it holds out its own "
-            "validation and calibration legs."
+            "(docs/classifier.md): it learns m* of its legs, a part of DNN1's, of which it holds "
+            "out its own validation and calibration legs."
         ),
         findings=tuple(_findings(outcomes)),
         tables=(_table(outcomes), _margin_table(outcomes)),

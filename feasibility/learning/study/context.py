@@ -36,6 +36,8 @@ class Context:
         Threads of a network's training.
     device : str
         Where networks are trained: "cpu", "cuda" or "auto".
+    precision : str
+        In what they are trained: "float32", "bfloat16" or "auto".
     say : callable
         Told what is going on, a line at a time.
     """
@@ -47,6 +49,7 @@ class Context:
     workers: int
     threads: int
     device: str
+    precision: str
     say: Callable[[str], None]
 
     def cell_key(self, **settings: object) -> Key:

@@ -45,6 +45,8 @@ class StudyData:
         Fold of each row of the pool, 0 to `N_FOLDS` - 1.
     test : (b,) int64
         Test rows, as many feasible as infeasible ones; no pair of bodies is in both.
+    most_judged : int
+        Rows that a model is judged by at most, in the test set or in a fold.
     fingerprint : str
         Digest of all the above: cells of other data are never mistaken for these.
     source : str
@@ -59,6 +61,7 @@ class StudyData:
     pool: NDArray[np.int64]
     folds: NDArray[np.int64]
     test: NDArray[np.int64]
+    most_judged: int
     fingerprint: str
     source: str
 
@@ -98,9 +101,9 @@ class StudyData:
         shares = [1.0 - preset.test_share, preset.test_share]
         part = split_pairs(pairs, shares, np.random.default_rng([seed, _SPLIT]))
         pool = np.flatnonzero(part == 0)
-        test = _balanced_test(
-            np.flatnonzero(part == 1), y, preset.test_rows, np.random.default_rng([seed, _BALANCE])
-        )
+        held_out = np.flatnonzero(part == 1)
+        rng = np.random.default_rng([seed, _BALANCE])
+        test = held_out[balanced_rows(y[held_out], rng, most=preset.test_rows)]
         if len(test) < 2 or y[pool].all() or not y[pool].any():
             raise InputError(
                 f"dataset of {len(y)} legs, {int(y.sum())} of them flyable: too few of a class "
@@ -117,6 +120,7 @@ class StudyData:
             pool=pool,
             folds=folds,
             test=test,
+            most_judged=preset.test_rows,
             fingerprint=_digest(X, y, pool, folds, test),
             source=(
                 f"{len(dataset)} legs of protocol {protocol['name']} (seed "
@@ -149,10 +153,10 @@ class StudyData:
         return np.concatenate(parts)
 
     def fold_rows(self, fold: int, seed: int) -> NDArray[np.int64]:
-        """Return the rows of one fold, balanced."""
+        """Return rows of one fold, balanced, at most as many as the test set may have."""
         rows = self.pool[self.folds == fold]
         rng = np.random.default_rng([seed, _BALANCE, fold])
-        balanced: NDArray[np.int64] = rows[balanced_rows(self.y[rows], rng)]
+        balanced: NDArray[np.int64] = rows[balanced_rows(self.y[rows], rng, most=self.most_judged)]
         return balanced
 
     @property
@@ -160,16 +164,6 @@ class StudyData:
         """Rows of the smaller class in the pool: half of the largest balanced training set."""
         feasible = int(self.y[self.pool].sum())
         return min(feasible, len(self.pool) - feasible)
-
-
-def _balanced_test(
-    rows: NDArray[np.int64], y: NDArray[np.bool_], most: int, rng: np.random.Generator
-) -> NDArray[np.int64]:
-    per_class = min(most // 2, int(y[rows].sum()), int((~y[rows]).sum()))
-    parts = [
-        rng.choice(rows[y[rows] == value], per_class, replace=False) for value in (True, False)
-    ]
-    return np.sort(np.concatenate(parts)).astype(np.int64)
 
 
 def _digest(*arrays: NDArray[np.generic]) -> str:

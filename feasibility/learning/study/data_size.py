@@ -8,7 +8,7 @@ from feasibility.learning.study import paper_values
 from feasibility.learning.study.context import Context
 from feasibility.learning.study.figures import COLOURS, NAMES, error_line, panels
 from feasibility.learning.study.fit import Fit, Outcome, over_seeds, run_fit
-from feasibility.learning.study.margin import COMPARED_WITH, MARGIN, margin_sizes, run_margin
+from feasibility.learning.study.margin import MARGIN, run_margin
 from feasibility.learning.study.result import Result, Table
 
 if TYPE_CHECKING:
@@ -45,10 +45,9 @@ def run(context: Context) -> Result:
             if samples not in curves[model]:
                 curves[model][samples] = [run_fit(context, fit) for fit in fits]
     curves[MARGIN] = {}
-    for size in margin_sizes(tuple(curves.get(COMPARED_WITH, ()))):
-        curves[MARGIN][size] = [
-            run_margin(context, size, seed) for seed in range(preset.data_size_seeds)
-        ]
+    for size in preset.margin_sizes:
+        runs = [run_margin(context, size, seed) for seed in range(preset.data_size_seeds)]
+        curves[MARGIN][runs[0].legs] = runs
     rows = []
     for model, curve in curves.items():
         for samples, outcomes in curve.items():
@@ -170,8 +169,9 @@ def _margin_findings(
             f"The margin model is at {means[size]:.4f} with {size} legs; the paper's network is "
             f"at {published:.4f} with {paper_values.TABLE_6_SAMPLES['dnn1']}."
         )
-    if means:
-        size = max(means)
+    shared = set(means) & set(network)
+    if shared:
+        size = max(shared)
         findings.append(
             f"From the same {size} legs the margin model errs on {1.0 - means[size]:.2%} of the "
             f"test legs, DNN1 on {1.0 - over_seeds(network[size], 'accuracy')[0]:.2%}."

@@ -130,6 +130,7 @@ def build_model(context: Context, name: str, legs: int) -> Model:
         keep_best=False,
         threads=context.threads,
         device=context.device,
+        precision=context.precision,
     )
 
 

@@ -15,21 +15,10 @@ from feasibility.learning.study.fit import Outcome, judge
 MARGIN: Final = "margin"
 """Name of the model among the keys of `figures.NAMES`; it is none of the paper's."""
 
-COMPARED_WITH: Final = "dnn1"
-"""The margin model learns from as many legs as this one does in every experiment."""
-
-_LEAST_LEGS: Final = 60
-"""Fewer give no validation and calibration parts."""
-
 _LEAST_BATCH, _LARGEST_BATCH = 32, 1024
 _BATCHES_OF_AN_EPOCH: Final = 16
 _STEPS: Final = 8000
 _FEWEST_EPOCHS, _MOST_EPOCHS = 12, 60
-
-
-def margin_sizes(sizes: tuple[int, ...]) -> tuple[int, ...]:
-    """Return the training sizes that are large enough for the margin model."""
-    return tuple(size for size in sizes if size >= _LEAST_LEGS)
 
 
 def margin_recipe(context: Context, legs: int, seed: int) -> MarginRecipe:

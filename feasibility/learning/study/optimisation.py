@@ -64,7 +64,12 @@ def _task(context: Context) -> Task:
     standardiser = Standardiser.fit(X)
     fixed: dict[str, Any] = {}
     if preset.tuning_model == "dnn":
-        fixed = {"epochs": preset.tuning_epochs, "threads": 1, "device": context.device}
+        fixed = {
+            "epochs": preset.tuning_epochs,
+            "threads": 1,
+            "device": context.device,
+            "precision": context.precision,
+        }
     return Task(
         model=preset.tuning_model,
         X=standardiser.transform(X),

@@ -44,6 +44,8 @@ class Preset:
         Fig. 3: training sizes of each model (balanced).
     data_size_seeds : int
         Fig. 3: draws of the training set for each size.
+    margin_sizes : tuple of int
+        Fig. 3: training sizes of the margin model, some of DNN1's; Table 6 has the largest.
     comparison : mapping of str to int
         Table 6: training size of each model.
     comparison_seeds : int
@@ -80,6 +82,7 @@ class Preset:
     least_steps: int
     data_size: Mapping[str, tuple[int, ...]]
     data_size_seeds: int
+    margin_sizes: tuple[int, ...]
     comparison: Mapping[str, int]
     comparison_seeds: int
     n_features: tuple[int, ...]
@@ -119,6 +122,7 @@ _QUICK: Final = Preset(
     least_steps=100,
     data_size=_same((250, 500, 1000, 2000), "ensemble", "knn", "svm", "tree", "dnn1"),
     data_size_seeds=3,
+    margin_sizes=(500, 2000),
     comparison=dict.fromkeys(MODELS, 2000),
     comparison_seeds=3,
     n_features=_TABLE_4_COUNTS,
@@ -144,14 +148,15 @@ _LAPTOP: Final = Preset(
     legs=640_000,
     test_share=0.06,
     test_rows=20_000,
-    epochs=24,
+    epochs=18,
     least_steps=1000,
     data_size={
         **_same((1000, 2000, 5000, 10_000, 20_000, 50_000), "ensemble", "knn", "tree"),
         "svm": (1000, 2000, 5000, 10_000, 20_000, 30_000),
-        "dnn1": (1000, 5000, 10_000, 20_000, 50_000, 100_000, 200_000, 400_000),
+        "dnn1": (1000, 5000, 20_000, 50_000, 100_000, 400_000),
     },
     data_size_seeds=3,
+    margin_sizes=(5000, 20_000, 100_000),
     comparison={
         "ensemble": 50_000,
         "knn": 50_000,
@@ -164,19 +169,19 @@ _LAPTOP: Final = Preset(
     n_features=_TABLE_4_COUNTS,
     n_features_rows=40_000,
     n_features_folds=3,
-    curve_rows=40_000,
+    curve_rows=20_000,
     curve_seeds=3,
-    feasible={"ensemble": 10_000, "knn": 10_000, "svm": 4000, "tree": 10_000, "dnn1": 10_000},
-    ratios=(1.0, 2.0, 3.0, 5.0),
+    feasible={"ensemble": 5000, "knn": 5000, "svm": 3000, "tree": 5000, "dnn1": 5000},
+    ratios=(1.0, 2.0, 5.0),
     imbalance_seeds=2,
     tuning_model="dnn",
-    tuning_rows=20_000,
+    tuning_rows=10_000,
     tuning_trials=30,
-    tuning_epochs=12,
+    tuning_epochs=16,
     tuning_workers=2,
     ranking_seeds=5,
-    label_legs=2000,
-    label_models=("ensemble", "tree", "dnn1"),
+    label_legs=300,
+    label_models=("ensemble", "tree"),
 )
 
 _PAPER: Final = Preset(
@@ -192,6 +197,7 @@ _PAPER: Final = Preset(
         "dnn1": (1000, 5000, 10_000, 20_000, 30_000, 50_000, 100_000, 200_000, 400_000),
     },
     data_size_seeds=5,
+    margin_sizes=(5000, 20_000, 100_000, 400_000),
     comparison={
         "ensemble": 50_000,
         "knn": 50_000,

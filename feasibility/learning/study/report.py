@@ -141,7 +141,7 @@ def _what_was_run(record: dict[str, Any]) -> str:
             "machine",
             f"{machine['processor']}, {machine['cores']} cores, {machine['memory_gib']} GiB; "
             f"{record['workers']} workers, {record['threads']} threads, networks on "
-            f"{record['device']}",
+            f"{record['device']} in {record['recipe']['precision']}",
         ),
         ("versions", f"Python {origin['python']}, {versions}"),
         ("commit", str(origin["git_commit"])),

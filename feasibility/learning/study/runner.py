@@ -16,6 +16,8 @@ from feasibility.atomic import write_text
 from feasibility.dataset import Dataset, begin, read_dataset, read_protocol
 from feasibility.errors import InputError
 from feasibility.learning.extra import load_extra
+from feasibility.learning.models.dnn import find_device
+from feasibility.learning.models.precision import resolve_precision
 from feasibility.learning.study import EXPERIMENTS
 from feasibility.learning.study.cells import Cells
 from feasibility.learning.study.context import Context
@@ -54,6 +56,9 @@ class Settings:
         Threads of a network's training.
     device : str
         Where networks are trained: "cpu", "cuda" or "auto".
+    precision : str
+        In what they are trained: "float32", "bfloat16", or "auto" for bfloat16 where the
+        hardware has it.
     """
 
     preset: Preset
@@ -64,6 +69,7 @@ class Settings:
     workers: int = 2
     threads: int = 2
     device: str = "cpu"
+    precision: str = "auto"
 
 
 def run_study(
@@ -119,6 +125,7 @@ def run_study(
         workers=settings.workers,
         threads=settings.threads,
         device=settings.device,
+        precision=record["recipe"]["precision"],
         say=say,
     )
     results = {}
@@ -152,6 +159,8 @@ def _run_one(context: Context, name: str, record: dict[str, Any]) -> Result:
     before, began = context.cells.computed, time.perf_counter()
     experiment = importlib.import_module(f"feasibility.learning.study.{name}")
     result: Result = experiment.run(context)
+    # Read again: another process may have done other experiments in the same folder meanwhile.
+    record["experiments"] = read_record(context.out)["experiments"]
     known = record["experiments"].get(name, {"seconds": 0.0, "cells": 0})
     computed = context.cells.computed - before
     if computed or name not in record["experiments"]:
@@ -200,11 +209,15 @@ def _make_folder(folder: Path) -> None:
 
 def _open_record(settings: Settings, data: StudyData) -> dict[str, Any]:
     """Return the record of the folder, begun now or before with the same settings."""
+    torch = load_extra("torch")
+    device = find_device(torch, settings.device)
+    precision = resolve_precision(torch, settings.precision, device)
     recipe = {
         "preset": settings.preset.name,
         "sizes": json.loads(json.dumps(settings.preset.to_dict())),
         "seed": settings.seed,
         "fingerprint": data.fingerprint,
+        "precision": precision,
     }
     _make_folder(settings.out)
     if (settings.out / RECORD).exists():
@@ -213,7 +226,7 @@ def _open_record(settings: Settings, data: StudyData) -> dict[str, Any]:
             if record["recipe"].get(key) != value:
                 raise InputError(
                     f"{settings.out}: holds a study with another {key}; expected the same preset, "
-                    "seed and data as before, or another --out"
+                    "seed, data and precision as before, or another --out"
                 )
         return record
     record = {
