@@ -42,7 +42,7 @@ def _processor_has_tiles(torch: Any) -> bool:
     What torch calls the question differs between its versions; one that has no
     answer counts as no.
     """
-    capabilities = getattr(torch.cpu, "get_capabilities", dict)()
+    capabilities: dict[str, Any] = getattr(torch.cpu, "get_capabilities", dict)()
     if "amx_bf16" in capabilities:
         return bool(capabilities["amx_bf16"])
     return bool(getattr(torch.cpu, "_is_amx_tile_supported", bool)())
