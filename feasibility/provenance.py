@@ -15,17 +15,25 @@ _PACKAGES = ("seqsearch", *_LIBRARIES)
 def provenance() -> dict[str, Any]:
     """Return versions of Python and packages, platform, time, command and git commit.
 
+    Absolute paths in the command are cut to their last name, as folders tell about a machine only.
     The commit is that of this project's own checkout, None outside one; a
     trailing ``+`` says that tracked files had been changed.
     """
     return {
         "created_utc": datetime.now(UTC).isoformat(timespec="seconds"),
-        "command": sys.argv,
+        "command": [_without_folder(word) for word in sys.argv],
         "python": platform.python_version(),
         "platform": platform.platform(),
         "versions": {name: _version(name) for name in _PACKAGES},
         "git_commit": _git_commit(),
     }
+
+
+def _without_folder(word: str) -> str:
+    option, equals, value = word.partition("=")
+    if equals and Path(value).is_absolute():
+        return f"{option}={Path(value).name}"
+    return Path(word).name if Path(word).is_absolute() else word
 
 
 def _version(package: str) -> str | None:

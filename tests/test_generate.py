@@ -300,6 +300,31 @@ def test_a_catalogue_file_is_known_by_its_content(protocol_file, tmp_path, capsy
     assert "was begun with catalogue." in error_of(capsys)
 
 
+def test_metadata_name_the_catalogue_but_no_folder_of_this_machine(
+    protocol_file, tmp_path, monkeypatch
+):
+    header = "ID epoch(MJD) a(AU) e i(deg) LAN(deg) argperi(deg) M(deg)\n"
+    rows = [f"{k} 64328 2.{30 + k} 0.08 {k / 3} 103.8 151.2 {7 * k}" for k in range(1, 30)]
+    (tmp_path / "table.txt").write_text(header + "\n".join(rows) + "\n")
+    folder = tmp_path / "data"
+    options = ["--out", str(folder), "--catalogue", str(tmp_path / "table.txt"), "--legs", "2"]
+    words = ["generate", str(protocol_file), *options]
+    monkeypatch.setattr(sys, "argv", [str(tmp_path / "feasibility"), *words])
+    assert main(words) == 0
+    text = (folder / METADATA).read_text()
+    assert str(tmp_path) not in text
+    described = json.loads(text)
+    assert described["catalogue"]["source"] == "table.txt"
+    assert described["protocol"]["catalogue"]["file"] == "table.txt"
+    # Folders begun before this was so are completed all the same.
+    described["catalogue"]["source"] = "/elsewhere/table.txt"
+    described["protocol"]["catalogue"]["file"] = "/elsewhere/table.txt"
+    (folder / METADATA).write_text(json.dumps(described))
+    assert main([*words[:-1], "3"]) == 0
+    assert "elsewhere" not in (folder / METADATA).read_text()
+    assert read_dataset(folder).metadata["catalogue"]["source"] == "table.txt"
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [

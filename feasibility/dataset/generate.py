@@ -13,6 +13,7 @@ from feasibility.dataset.protocol import Protocol
 from feasibility.dataset.storage import (
     METADATA,
     has_shard,
+    names_only,
     read_metadata,
     remove_leftovers,
     shard_path,
@@ -117,6 +118,8 @@ def begin(protocol: Protocol, legs: int, folder: Path, *, seed: int = 0) -> Gene
         "seed": seed,
         "catalogue": {"source": catalogue.source, "bodies": len(catalogue), "sha256": sha256},
     }
+    # The digest tells the file; its folder is this machine's affair.
+    recipe = names_only(recipe)
     sessions = _open_folder(folder, recipe, legs)
     record = {
         "legs": legs,

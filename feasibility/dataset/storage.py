@@ -110,6 +110,17 @@ def write_metadata(folder: Path, metadata: Mapping[str, Any]) -> None:
     write_text(folder / METADATA, json.dumps(record, indent=1) + "\n")
 
 
+def names_only(metadata: Mapping[str, Any]) -> dict[str, Any]:
+    """Return metadata in which a catalogue file is told by its name, without its folder."""
+    plain = dict(metadata)
+    table = plain.get("protocol", {}).get("catalogue", {})
+    if table.get("file") is not None:
+        name = Path(table["file"]).name
+        plain["protocol"] = plain["protocol"] | {"catalogue": table | {"file": name}}
+        plain["catalogue"] = plain["catalogue"] | {"source": name}
+    return plain
+
+
 def read_metadata(folder: Path) -> dict[str, Any]:
     """Read ``metadata.json``.
 
@@ -130,7 +141,8 @@ def read_metadata(folder: Path) -> dict[str, Any]:
     version = metadata.get("format") if isinstance(metadata, dict) else None
     if version != FORMAT:
         raise InputError(f"{path}: format {version}, expected {FORMAT}; generate the dataset anew")
-    return dict(metadata)
+    # Older versions wrote the folder of the catalogue too.
+    return names_only(metadata)
 
 
 def remove_leftovers(folder: Path) -> None:

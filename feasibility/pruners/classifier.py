@@ -16,6 +16,7 @@ class ClassifierPruner:
     """Keeps a leg that is likely enough to be feasible, or that the classifier does not know.
 
     A leg outside the classifier's domain is kept: nothing is known against it.
+    `keep_with_unknown` says which legs these are, so that a search can count them.
 
     Parameters
     ----------
@@ -51,5 +52,21 @@ class ClassifierPruner:
 
     def keep(self, legs: Legs, /) -> NDArray[np.bool_]:
         """Return (n,) bool, True where the leg survives."""
+        return self.keep_with_unknown(legs)[0]
+
+    def keep_with_unknown(self, legs: Legs, /) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Return the mask of `keep` and which legs are kept only because they are not known.
+
+        Row-wise and pure as `keep` is: who counts the second mask keeps the count.
+
+        Returns
+        -------
+        mask : (n,) bool
+            True where the leg survives.
+        unknown : (n,) bool
+            True where it survives for being outside the domain, though its probability is below
+            the threshold.
+        """
         probability, inside = self.classifier.assess(legs)
-        return (probability >= self.threshold) | ~inside
+        likely = probability >= self.threshold
+        return likely | ~inside, ~likely & ~inside
