@@ -1,17 +1,129 @@
 """Pools of worker processes for long computations."""
 
+import functools
 import multiprocessing
 import os
 import signal
 import sys
 import threading
-from collections.abc import Iterator
-from concurrent.futures import Executor, ProcessPoolExecutor
+from collections.abc import Callable, Iterator
+from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor
 from contextlib import contextmanager
+from typing import Any, Final, final
+
+_TRIES: Final = 3
+"""How often a call is begun before its workers' deaths are taken for its own doing."""
+
+
+@final
+class WorkersLostError(BrokenExecutor):
+    """Worker processes died again and again over the same call."""
+
+
+@final
+class MendingPool(Executor):
+    """A process pool that outlives its workers.
+
+    Where a worker dies (killed by hand, or by a system short of memory), the
+    pool is made anew and every call that was not finished is begun again, three
+    times at most. Calls must not mind being run twice.
+
+    Parameters
+    ----------
+    workers : int
+        Number of processes.
+
+    Attributes
+    ----------
+    mended : int
+        How often the pool was made anew.
+    """
+
+    def __init__(self, workers: int) -> None:
+        self.mended = 0
+        self._workers = workers
+        self._lock = threading.Lock()
+        self._closed = False
+        self._pool = _process_pool(workers)
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        """Call `fn` in a worker; the future raises `WorkersLostError` where the pool gives up."""
+        call = _Call(functools.partial(fn, *args, **kwargs))
+        self._begin(call)
+        return call.future
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        """End the workers."""
+        with self._lock:
+            self._closed = True
+        self._pool.shutdown(wait=wait, cancel_futures=cancel_futures)
+
+    def _begin(self, call: "_Call") -> None:
+        # No lock is held while a pool is asked: it tells of its end under a lock of its own.
+        while True:
+            pool = self._pool
+            try:
+                inner = pool.submit(call.function)
+                break
+            except BrokenExecutor:
+                self._replace(pool)
+        call.inner = inner
+        inner.add_done_callback(functools.partial(self._end, call, pool))
+        if call.future.cancelled():
+            inner.cancel()
+
+    def _replace(self, broken: ProcessPoolExecutor) -> None:
+        with self._lock:
+            if self._closed:
+                raise RuntimeError("the pool was shut down")
+            if self._pool is broken:
+                self._pool = _process_pool(self._workers)
+                self.mended += 1
+
+    def _end(self, call: "_Call", pool: ProcessPoolExecutor, inner: Future[Any]) -> None:
+        if inner.cancelled():
+            call.future.cancel()
+            call.future.set_running_or_notify_cancel()
+            return
+        error = inner.exception()
+        if isinstance(error, BrokenExecutor) and not call.future.cancelled():
+            call.tries += 1
+            try:
+                self._replace(pool)
+                if call.tries < _TRIES:
+                    self._begin(call)
+                    return
+                error = WorkersLostError(
+                    f"worker processes died {_TRIES} times in a row (killed, or out of memory)"
+                )
+            except RuntimeError as closed:
+                error = closed
+        if not call.future.set_running_or_notify_cancel():
+            return
+        if error is None:
+            call.future.set_result(inner.result())
+        else:
+            call.future.set_exception(error)
+
+
+@final
+class _Call:
+    """A call, the future that its caller holds, and the one of the present pool."""
+
+    def __init__(self, function: Callable[[], Any]) -> None:
+        self.function = function
+        self.tries = 0
+        self.inner: Future[Any] | None = None
+        self.future: Future[Any] = Future()
+        self.future.add_done_callback(self._pass_on)
+
+    def _pass_on(self, future: Future[Any]) -> None:
+        if future.cancelled() and self.inner is not None:
+            self.inner.cancel()
 
 
 @contextmanager
-def worker_pool(workers: int) -> Iterator[Executor | None]:
+def worker_pool(workers: int) -> Iterator[MendingPool | None]:
     """Yield a process pool whose workers leave Ctrl-C to this process; None for one worker.
 
     Parameters
@@ -22,13 +134,17 @@ def worker_pool(workers: int) -> Iterator[Executor | None]:
     if workers == 1:
         yield None
         return
-    # Workers start from a clean process: forking one that has loaded threaded libraries can hang.
-    context = multiprocessing.get_context("forkserver" if sys.platform != "win32" else "spawn")
-    pool = ProcessPoolExecutor(workers, mp_context=context, initializer=_prepare_worker)
+    pool = MendingPool(workers)
     try:
         yield pool
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _process_pool(workers: int) -> ProcessPoolExecutor:
+    # Workers start from a clean process: forking one that has loaded threaded libraries can hang.
+    context = multiprocessing.get_context("forkserver" if sys.platform != "win32" else "spawn")
+    return ProcessPoolExecutor(workers, mp_context=context, initializer=_prepare_worker)
 
 
 def _prepare_worker() -> None:
