@@ -20,7 +20,8 @@ from seqsearch.frontier import Frontier, make_frontier
 from seqsearch.nodes import Nodes
 from seqsearch.optimisation import LegOptimiser, Optimised, SolvedHops
 from seqsearch.pruner_spec import parse_pruner
-from seqsearch.ranking import Ranking, TimePropellantRanking
+from seqsearch.ranking import Ranking
+from seqsearch.rankings import make_ranking
 from seqsearch.settings import SearchSettings
 from seqsearch.starts import dense_starts
 from seqsearch.state import SearchState
@@ -82,7 +83,7 @@ def search(
     settings : SearchSettings, optional
         How to search.
     ranking : Ranking, optional
-        Which nodes to keep; default: weighted time and propellant.
+        Which nodes to keep; default: the one that `settings` name.
     rng : numpy.random.Generator, optional
         Draws the start epochs; default: seed 0. The same seed gives the same
         result with any executor, unless a time limit cuts the search short.
@@ -121,7 +122,7 @@ def search(
         settings,
         pruner or parse_pruner(settings.pruner),
         predictor,
-        ranking or TimePropellantRanking(settings.time_weight, settings.propellant_weight),
+        ranking,
         LegOptimiser(executor),
         Deadline(time_limit_s),
         state,
@@ -140,7 +141,7 @@ class _Search:
         settings: SearchSettings,
         pruner: Pruner,
         predictor: LegPredictor | None,
-        ranking: Ranking,
+        ranking: Ranking | None,
         optimiser: LegOptimiser,
         deadline: Deadline,
         state: SearchState,
@@ -151,7 +152,6 @@ class _Search:
         self._settings = settings
         self._pruner = pruner if isinstance(pruner, AllOf) else AllOf(pruner)
         self._predictor = predictor
-        self._ranking = ranking
         self._optimiser = optimiser
         self._deadline = deadline
         self._state = state
@@ -160,6 +160,7 @@ class _Search:
         self._neighbours = OrbitalNeighbours(
             problem.catalogue, reference_tof_days=settings.reference_tof_days
         )
+        self._ranking = ranking or make_ranking(settings, predictor, self._neighbours)
         self._spent_before = state.spent_s
         self._began = time.monotonic()
 

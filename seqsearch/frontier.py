@@ -9,6 +9,7 @@ from seqsearch.nodes import Nodes
 from seqsearch.ranking import Ranking
 from seqsearch.selection import select
 from seqsearch.settings import SearchSettings
+from seqsearch.time_slices import TimeSliceFrontier
 from seqsearch.tour_problem import TourProblem
 
 
@@ -85,6 +86,8 @@ class DepthFrontier:
 
 def make_frontier(settings: SearchSettings, problem: TourProblem, ranking: Ranking) -> Frontier:
     """Return the frontier that the settings ask for."""
+    if settings.frontier == "time":
+        return TimeSliceFrontier(settings, problem, ranking)
     return DepthFrontier(settings, problem, ranking)
 
 

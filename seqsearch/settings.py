@@ -1,6 +1,6 @@
 """`SearchSettings`: how the search goes about it; the ``[search]`` table of a problem file."""
 
-from typing import Annotated, final
+from typing import Annotated, Literal, final
 
 import msgspec
 import numpy as np
@@ -53,6 +53,17 @@ class SearchSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
     audit_per_rank : int
         Pruned candidates of each rank that are optimised all the same, to learn what
         pruning costs, and half as many kept ones; 0 for no audit.
+    ranking : str
+        Which nodes are better: ``"weighted"`` time and propellant, ``"pareto"`` fronts of
+        both, or ``"potential"``, weighted with a penalty for few ways on (needs a classifier).
+    potential_weight : float
+        Penalty of a node without a way on, for the ranking ``"potential"``.
+    frontier : str
+        Nodes compete with those of equal ``"depth"``, or of equal elapsed time: ``"time"``.
+    slice_days : float
+        Width of the slices of elapsed time, for the frontier ``"time"``.
+    nominal_visits : int
+        Visits of a good tour, by which the frontier ``"time"`` values one more.
     passes : int
         Beams run one after another, each with starts of its own.
     """
@@ -76,6 +87,11 @@ class SearchSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
     time_weight: Annotated[float, Meta(ge=0)] = 1.0
     propellant_weight: Annotated[float, Meta(ge=0)] = 0.6
     audit_per_rank: Annotated[int, Meta(ge=0)] = 100
+    ranking: Literal["weighted", "pareto", "potential"] = "weighted"
+    potential_weight: Annotated[float, Meta(ge=0)] = 0.1
+    frontier: Literal["depth", "time"] = "depth"
+    slice_days: _Positive = 40.0
+    nominal_visits: _Count = 14
     passes: _Count = 1
 
     def __post_init__(self) -> None:
@@ -88,6 +104,11 @@ class SearchSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
             raise ValueError("departure_delays_days is empty, expected at least one delay")
         if self.time_weight + self.propellant_weight <= 0:
             raise ValueError("time_weight and propellant_weight are both zero")
+        if self.frontier == "time" and self.ranking == "pareto":
+            raise ValueError(
+                'frontier = "time" cannot weigh a visit more in ranking = "pareto", '
+                'expected "weighted" or "potential"'
+            )
 
     def with_(self, **changes: object) -> "SearchSettings":
         """Return the settings with some values replaced, validated.
