@@ -56,7 +56,8 @@ loaded in `__post_init__` from its file's bytes, as a session itself cannot be p
 """
 
 from feasibility.pruners.all_of import AllOf, pruner_name
-from feasibility.pruners.check import PrunerContractError, check_pruner
+from feasibility.pruners.asking import PrunerContractError
+from feasibility.pruners.check import check_pruner
 from feasibility.pruners.classifier import ClassifierPruner
 from feasibility.pruners.keep_all import KeepAll
 from feasibility.pruners.lambert import LambertPruner

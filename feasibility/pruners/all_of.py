@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.legs import Legs
+from feasibility.pruners.asking import ask
 from feasibility.pruners.protocol import Pruner
 
 
@@ -52,12 +53,17 @@ class AllOf:
         pruned : dict of str to int
             By pruner name, in the order in which they were asked; the second
             pruner of the same name is called ``name-2``, and so on.
+
+        Raises
+        ------
+        PrunerContractError
+            A pruner raised, or returned something else than a boolean a leg.
         """
         mask = np.ones(len(legs), dtype=np.bool_)
         pruned: dict[str, int] = {}
         for pruner in self.pruners:
             rows = np.flatnonzero(mask)
-            kept = pruner.keep(legs.take(rows))
+            kept = ask(pruner, legs.take(rows))
             mask[rows] = kept
             pruned[_unused(pruner_name(pruner), pruned)] = len(rows) - int(np.count_nonzero(kept))
         return mask, pruned

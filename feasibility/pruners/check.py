@@ -1,21 +1,16 @@
 """`check_pruner`: tests that a pruner honours the contract of `Pruner`."""
 
 import pickle
-from typing import final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.constants import AU, MU_SUN
 from feasibility.legs import Legs
+from feasibility.pruners.asking import PrunerContractError, ask
 from feasibility.pruners.protocol import Pruner
 
 _N_LEGS = 64
-
-
-@final
-class PrunerContractError(AssertionError):
-    """A pruner breaks the contract; the message is one line that says how."""
 
 
 def check_pruner(
@@ -45,14 +40,13 @@ def check_pruner(
     generator = np.random.default_rng(0) if rng is None else rng
     batch = _varied_legs(generator) if legs is None else legs
     label = f"{type(pruner).__name__}.keep"
-    n = len(batch)
     before = pickle.dumps(batch)
-    mask = _ask(pruner, batch, label, f"{n} legs")
+    mask = ask(pruner, batch)
     if pickle.dumps(batch) != before:
         raise PrunerContractError(f"{label}: not pure: it changed the legs")
-    if not np.array_equal(_ask(pruner, batch, label, f"{n} legs"), mask):
+    if not np.array_equal(ask(pruner, batch), mask):
         raise PrunerContractError(f"{label}: not pure: two calls with the same legs differ")
-    _ask(pruner, batch.take(np.arange(0)), label, "no legs")
+    ask(pruner, batch.take(np.arange(0)))
     _check_row_wise(pruner, batch, mask, label, generator)
     try:
         twin = pickle.loads(pickle.dumps(pruner))
@@ -61,29 +55,8 @@ def check_pruner(
             f"{type(pruner).__name__}: not picklable, so it cannot travel to worker processes "
             f"({type(error).__name__}: {error})"
         ) from error
-    if not np.array_equal(_ask(twin, batch, label, f"{n} legs"), mask):
+    if not np.array_equal(ask(twin, batch), mask):
         raise PrunerContractError(f"{label}: a pickled and restored copy answers differently")
-
-
-def _ask(pruner: Pruner, legs: Legs, label: str, what: str) -> NDArray[np.bool_]:
-    try:
-        mask = pruner.keep(legs)
-    except Exception as error:
-        raise PrunerContractError(
-            f"{label}: raised {type(error).__name__} on {what}: {error}"
-        ) from error
-    if not isinstance(mask, np.ndarray):
-        raise PrunerContractError(
-            f"{label}: returned {type(mask).__name__} on {what}, expected a numpy array"
-        )
-    if mask.shape != (len(legs),):
-        raise PrunerContractError(
-            f"{label}: returned shape {mask.shape} on {what}, expected ({len(legs)},)"
-        )
-    if mask.dtype != np.bool_:
-        raise PrunerContractError(f"{label}: returned dtype {mask.dtype} on {what}, expected bool")
-    # A view of an array that the pruner keeps could change under our feet.
-    return mask.copy()
 
 
 def _check_row_wise(
@@ -104,7 +77,7 @@ def _check_row_wise(
     ]
     selections += [(f"leg {row} is asked alone", every[row : row + 1]) for row in range(min(n, 5))]
     for what, rows in selections:
-        answer = _ask(pruner, legs.take(rows), label, f"{len(rows)} legs")
+        answer = ask(pruner, legs.take(rows))
         if not np.array_equal(answer, mask[rows]):
             raise PrunerContractError(
                 f"{label}: not row-wise: a leg gets another answer when {what}"
