@@ -136,7 +136,9 @@ def test_ranking_by_potential_without_a_classifier_is_an_error_that_says_so():
 
 
 _race = st.lists(
-    st.tuples(st.integers(1, 3), st.floats(0, 200), st.floats(900, 1900)), min_size=1, max_size=25
+    st.tuples(st.integers(1, 3), st.integers(0, 199), st.integers(900, 1900)),
+    min_size=1,
+    max_size=25,
 )
 
 

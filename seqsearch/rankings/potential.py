@@ -88,8 +88,9 @@ class PotentialRanking:
         """Return the potential at the centres of cells."""
         n = len(cells)
         rows = cells[:, 0].astype(np.intp)
-        epoch: NDArray[np.float64] = (cells[:, 1] + 0.5) * _CELL_DAYS
-        mass: NDArray[np.float64] = np.exp((cells[:, 2] + 0.5) * _CELL_MASS)
+        centres = cells.astype(np.float64) + 0.5
+        epoch = centres[:, 1] * _CELL_DAYS
+        mass = np.exp(centres[:, 2] * _CELL_MASS)
         nodes = Nodes.at_start(rows, epoch, mass)
         # One visit done: on some problems the first hop is of another kind than the rest.
         nodes = replace(
