@@ -89,6 +89,11 @@ class FeasibilityClassifier:
         ) as f:
             return cls(Artefact.load(f))
 
+    @property
+    def knows_margins(self) -> bool:
+        """Whether `margin` and all that rests on it can be asked."""
+        return isinstance(self._estimator, MarginEstimator)
+
     def feasible_probability(self, legs: Legs) -> NDArray[np.float64]:
         """Return (n,) the probability that each leg can be flown; never NaN.
 
@@ -113,6 +118,18 @@ class FeasibilityClassifier:
             The model knows no margins: only those of kind "margin" do.
         """
         return np.exp(self._margin_estimator().estimate(legs)[0])
+
+    def quick_margin(self, legs: Legs) -> NDArray[np.float64]:
+        """Return (n,) an estimate of m*/m0 some percent off, ten times faster than `margin`.
+
+        NaN where nothing is known and outside the domain.
+
+        Raises
+        ------
+        InputError
+            As for `margin`.
+        """
+        return np.exp(self._margin_estimator().quick_log_margin(legs))
 
     def final_mass(self, legs: Legs) -> NDArray[np.float64]:
         """Return (n,) kg, the estimate of the mass at arrival with least propellant.

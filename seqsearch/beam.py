@@ -11,22 +11,23 @@ from numpy.typing import NDArray
 
 from feasibility import AllOf, Pruner
 from feasibility.orbits import OrbitalNeighbours
-from feasibility.pruners.predictor import LegPredictor, lambert_final_mass
+from feasibility.pruners.predictor import LegPredictor
 from seqsearch.audit import RankSample
 from seqsearch.counters import RankCounters
 from seqsearch.deadline import Deadline
-from seqsearch.expansion import Candidates, expand, reached
+from seqsearch.expanders import Expanded, Expander, ForecastExpander, GridExpander
+from seqsearch.expansion import Candidates, reached
 from seqsearch.frontier import Frontier, make_frontier
 from seqsearch.nodes import Nodes
 from seqsearch.optimisation import LegOptimiser, Optimised, SolvedHops
-from seqsearch.pruner_spec import parse_pruner
+from seqsearch.pruner_spec import parse_pruner, predictor_of
 from seqsearch.ranking import Ranking
 from seqsearch.rankings import make_ranking
 from seqsearch.settings import SearchSettings
 from seqsearch.starts import dense_starts
 from seqsearch.state import SearchState
 from seqsearch.tour import Tour
-from seqsearch.tour_problem import Hops, TourProblem
+from seqsearch.tour_problem import TourProblem
 from seqsearch.tree import FlownLeg, SearchTree
 
 
@@ -63,6 +64,7 @@ def search(
     ranking: Ranking | None = None,
     rng: np.random.Generator | None = None,
     executor: Executor | None = None,
+    threads: int = 1,
     time_limit_s: float | None = None,
     resume: SearchState | None = None,
     on_rank: Callable[[SearchState], None] | None = None,
@@ -77,7 +79,8 @@ def search(
         Which candidate legs are worth optimising; default: the one that
         `settings` name.
     predictor : LegPredictor, optional
-        Predicts margins and final masses, by which candidates are ordered.
+        Finds flight times and tells which hops are worth optimising; default:
+        the classifier of the pruner, if that has one.
     beam_width : int, optional
         Overrides ``settings.beam_width``.
     settings : SearchSettings, optional
@@ -89,6 +92,8 @@ def search(
         result with any executor, unless a time limit cuts the search short.
     executor : concurrent.futures.Executor, optional
         Where legs are optimised; default: this process.
+    threads : int
+        Threads of this process that ask the predictor.
     time_limit_s : float, optional
         Stop after this wall-clock time with the best tour so far. Passes
         beyond ``settings.passes`` are then run until the time is up.
@@ -117,17 +122,19 @@ def search(
     state = resume or SearchState(settings=settings)
     if resume is not None:
         rng.bit_generator.state = resume.rng_state
+    pruner = pruner or parse_pruner(settings.pruner)
     return _Search(
         problem,
         settings,
-        pruner or parse_pruner(settings.pruner),
-        predictor,
+        pruner,
+        predictor or predictor_of(pruner),
         ranking,
         LegOptimiser(executor),
         Deadline(time_limit_s),
         state,
         rng,
         on_rank,
+        threads,
     ).run(endless=time_limit_s is not None)
 
 
@@ -147,6 +154,7 @@ class _Search:
         state: SearchState,
         rng: np.random.Generator,
         on_rank: Callable[[SearchState], None] | None,
+        threads: int,
     ) -> None:
         self._problem = problem
         self._settings = settings
@@ -161,6 +169,12 @@ class _Search:
             problem.catalogue, reference_tof_days=settings.reference_tof_days
         )
         self._ranking = ranking or make_ranking(settings, predictor, self._neighbours)
+        means = (problem, self._neighbours, self._pruner, self._ranking, optimiser)
+        self._expander: Expander = (
+            GridExpander(*means)
+            if predictor is None
+            else ForecastExpander(*means, predictor, threads)
+        )
         self._spent_before = state.spent_s
         self._began = time.monotonic()
 
@@ -192,12 +206,20 @@ class _Search:
             )
             start = time.perf_counter()
             sample = self._sample()
-            candidates = self._prune(nodes, counters, sample)
-            optimised = self._optimise(nodes, candidates, counters)
-            found = self._found(nodes, candidates, optimised)
+            expanded = self._expander.expand(
+                nodes, frontier, state.settings, counters, sample, self._deadline
+            )
+            found = None
+            if expanded is not None and expanded.optimised.solved is not None:
+                found = _Found.of(self._problem, nodes, expanded.candidates, expanded.optimised)
+            if expanded is not None:
+                counters.optimised = expanded.optimised.n_hops
+                counters.feasible = len(expanded.optimised.candidate)
+                state.solves += expanded.optimised.n_legs
             if sample is not None:
-                self._audit(sample, frontier, nodes, candidates, found, counters)
-            self._advance(frontier, candidates, optimised, found, counters)
+                self._audit(sample, frontier, nodes, expanded, found, counters)
+            if found is not None:
+                self._advance(frontier, found, counters)
             counters.cut = self._deadline.passed()
             counters.seconds = time.perf_counter() - start
             state.counters.append(counters)
@@ -231,89 +253,25 @@ class _Search:
             return None
         return RankSample(self._rng, len(self._state.counters), solves, self._predictor)
 
-    def _prune(
-        self, nodes: Nodes, counters: RankCounters, sample: RankSample | None
-    ) -> Candidates | None:
-        """Propose candidates and return those that every pruner keeps."""
-        kept = []
-        clock = time.perf_counter()
-        for block in expand(self._problem, nodes, self._neighbours, self._state.settings):
-            counters.proposed += len(block)
-            counters.seconds_expand += time.perf_counter() - clock
-            clock = time.perf_counter()
-            mask = self._keep(block.hops, counters)
-            counters.seconds_prune += time.perf_counter() - clock
-            clock = time.perf_counter()
-            if sample is not None:
-                sample.offer(block, mask)
-            if mask.any():
-                kept.append(block.take(mask))
-            if self._deadline.passed():
-                break
-        return Candidates.concatenate(kept) if kept else None
-
-    def _keep(self, hops: Hops, counters: RankCounters) -> NDArray[np.bool_]:
-        """Return (n,) bool, where all stages survive; each stage is asked about survivors only."""
-        mask = np.ones(len(hops), dtype=np.bool_)
-        for legs in hops.stages:
-            rows = np.flatnonzero(mask)
-            mask[rows], pruned = self._pruner.keep_with_counts(legs.take(rows))
-            counters.count_pruned(pruned)
-        return mask
-
-    def _optimise(
-        self, nodes: Nodes, candidates: Candidates | None, counters: RankCounters
-    ) -> Optimised | None:
-        if candidates is None:
-            return None
-        clock = time.perf_counter()
-        promise = self._promise(nodes, candidates)
-        optimised = self._optimiser.run(candidates, promise, self._state.settings, self._deadline)
-        counters.optimised = optimised.n_hops
-        counters.feasible = len(optimised.candidate)
-        self._state.solves += optimised.n_legs
-        counters.seconds_optimise = time.perf_counter() - clock
-        return optimised
-
-    def _promise(self, nodes: Nodes, candidates: Candidates) -> NDArray[np.float64]:
-        """Predict the score of the node that each hop leads to."""
-        last = candidates.hops.stages[-1]
-        predict = lambert_final_mass if self._predictor is None else self._predictor.final_mass
-        return self._ranking.score(
-            reached(self._problem, nodes, candidates, predict(last)), self._problem
-        )
-
-    def _found(
-        self, nodes: Nodes, candidates: Candidates | None, optimised: Optimised | None
-    ) -> Nodes | None:
-        """Return the nodes that the flyable hops lead to."""
-        if candidates is None or optimised is None or optimised.solved is None:
-            return None
-        flown, m_final = (
-            candidates.take(optimised.candidate),
-            optimised.solved.solutions[-1].m_final,
-        )
-        return reached(self._problem, nodes, flown, m_final)
-
     def _audit(
         self,
         sample: RankSample,
         frontier: Frontier,
         nodes: Nodes,
-        candidates: Candidates | None,
-        found: Nodes | None,
+        expanded: Expanded | None,
+        found: "_Found | None",
         counters: RankCounters,
     ) -> None:
         def contends(lost: Nodes) -> NDArray[np.bool_]:
-            n = 0 if found is None else len(found)
-            rivals = lost if found is None else Nodes.concatenate([found, lost])
+            n = 0 if found is None else len(found.nodes)
+            rivals = lost if found is None else Nodes.concatenate([found.nodes, lost])
             return np.isin(np.arange(n, n + len(lost)), frontier.admit(rivals))
 
         clock = time.perf_counter()
         counters.audit = sample.solve(
             self._problem,
             nodes,
-            candidates,
+            None if expanded is None else expanded.candidates,
             self._optimiser,
             self._state.settings.solver,
             self._deadline,
@@ -321,25 +279,15 @@ class _Search:
         )
         counters.seconds_audit = time.perf_counter() - clock
 
-    def _advance(
-        self,
-        frontier: Frontier,
-        candidates: Candidates | None,
-        optimised: Optimised | None,
-        found: Nodes | None,
-        counters: RankCounters,
-    ) -> None:
+    def _advance(self, frontier: Frontier, found: "_Found", counters: RankCounters) -> None:
         """Hang the nodes that go on into the tree and into the frontier."""
-        if candidates is None or optimised is None or optimised.solved is None or found is None:
-            return
-        flown, solved = candidates.take(optimised.candidate), optimised.solved
-        chosen = frontier.admit(found)
-        chains = _flown_legs(self._problem, flown.take(chosen), solved.take(chosen))
+        chosen = frontier.admit(found.nodes)
+        chains = _flown_legs(self._problem, found.flown.take(chosen), found.solved.take(chosen))
         ids = [
             self._state.tree.add_hop(int(parent), chain)
-            for parent, chain in zip(found.parent_id[chosen], chains, strict=True)
+            for parent, chain in zip(found.nodes.parent_id[chosen], chains, strict=True)
         ]
-        kept = replace(found.take(chosen), tree_id=np.asarray(ids, dtype=np.int64))
+        kept = replace(found.nodes.take(chosen), tree_id=np.asarray(ids, dtype=np.int64))
         frontier.push(kept)
         counters.kept = len(kept)
         self._note_best(kept)
@@ -358,6 +306,25 @@ class _Search:
 
     def _best_tour(self) -> Tour:
         return Tour.from_tree(self._problem, self._state.tree, self._state.best_node)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class _Found:
+    """Flyable hops and the nodes that they lead to, n each."""
+
+    flown: Candidates
+    solved: SolvedHops
+    nodes: Nodes
+
+    @classmethod
+    def of(
+        cls, problem: TourProblem, parents: Nodes, candidates: Candidates, optimised: Optimised
+    ) -> "_Found":
+        assert optimised.solved is not None
+        flown = candidates.take(optimised.candidate)
+        m_final = optimised.solved.solutions[-1].m_final
+        return cls(flown, optimised.solved, reached(problem, parents, flown, m_final))
 
 
 def _flown_legs(

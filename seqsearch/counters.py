@@ -18,7 +18,11 @@ class RankCounters:
     nodes : int
         Nodes that were expanded.
     proposed : int
-        Candidate legs.
+        Candidate hops.
+    questions : int
+        Legs that the predictor was asked about.
+    unknown : int
+        Candidates kept because the predictor knows nothing of them.
     pruned : dict of str to int
         Legs dropped by each pruner, in the order in which they were asked.
     optimised : int
@@ -39,6 +43,8 @@ class RankCounters:
     rank: int
     nodes: int = 0
     proposed: int = 0
+    questions: int = 0
+    unknown: int = 0
     pruned: dict[str, int] = field(default_factory=dict)
     optimised: int = 0
     feasible: int = 0

@@ -24,8 +24,12 @@ class Frontier(Protocol):
     have.
     """
 
-    def admit(self, nodes: Nodes, /) -> NDArray[np.intp]:
-        """Return the (k,) positions of nodes just reached that are worth going on with."""
+    def admit(self, nodes: Nodes, /, spare: float = 1.0) -> NDArray[np.intp]:
+        """Return the (k,) positions of nodes just reached that are worth going on with.
+
+        With `spare` above 1, of nodes that are only predicted and of which some will
+        fall away: about that many times as many.
+        """
         ...
 
     def push(self, nodes: Nodes, /) -> None:
@@ -64,11 +68,12 @@ class DepthFrontier:
         self._ranking = ranking
         self._nodes: Nodes | None = None
 
-    def admit(self, nodes: Nodes, /) -> NDArray[np.intp]:
+    def admit(self, nodes: Nodes, /, spare: float = 1.0) -> NDArray[np.intp]:
         """Return the positions of the best nodes within the beam width and the caps."""
         if len(nodes) == 0:
             return np.zeros(0, dtype=np.intp)
-        return select(self._ranking.score(nodes, self._problem), nodes, self._settings)
+        score = self._ranking.score(nodes, self._problem)
+        return select(score, nodes, self._settings, spare)
 
     def push(self, nodes: Nodes, /) -> None:
         """Take in the next rank."""

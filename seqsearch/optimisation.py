@@ -199,6 +199,25 @@ class LegOptimiser:
             active = still_active
         return _gather(done, n_legs, n_hops)
 
+    def run_all(
+        self,
+        candidates: Candidates,
+        order: NDArray[np.intp],
+        settings: SearchSettings,
+        deadline: Deadline,
+    ) -> Optimised:
+        """Optimise candidates in the given order, (n,) positions, up to `solves_per_rank`."""
+        rows = order[: settings.solves_per_rank]
+        done: list[tuple[NDArray[np.intp], SolvedHops]] = []
+        n_legs = n_hops = 0
+        for chunk, solved in self._solve(candidates.hops, rows, settings.solver, deadline):
+            n_legs += solved.n_legs
+            n_hops += len(chunk)
+            good = np.flatnonzero(solved.flyable)
+            if len(good):
+                done.append((rows[chunk[good]], solved.take(good)))
+        return _gather(done, n_legs, n_hops)
+
     def solve_all(self, hops: Hops, solver: str, deadline: Deadline) -> SolvedHops | None:
         """Optimise every one of n hops, at least one; None where the deadline came first."""
         parts = list(self._solve(hops, np.arange(len(hops)), solver, deadline))

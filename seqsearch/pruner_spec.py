@@ -4,6 +4,7 @@ from collections.abc import Callable
 from typing import Final
 
 from feasibility import AllOf, InputError, LambertPruner, Mima2Pruner, MimaPruner, Pruner
+from feasibility.pruners.predictor import LegPredictor
 
 _BY_NAME: Final[dict[str, Callable[..., Pruner]]] = {
     "lambert": LambertPruner,
@@ -37,6 +38,18 @@ def parse_pruner(spec: str) -> AllOf:
     if spec.strip() == "none":
         return AllOf()
     return AllOf(*(_parse_one(part.strip(), spec) for part in spec.split(",")))
+
+
+def predictor_of(pruner: Pruner) -> LegPredictor | None:
+    """Return the classifier of a pruner that has one and knows margins; None for none."""
+    # Imported here, as in `_classifier_pruner`.
+    from feasibility.pruners.classifier import ClassifierPruner
+
+    parts = pruner.pruners if isinstance(pruner, AllOf) else (pruner,)
+    for part in parts:
+        if isinstance(part, ClassifierPruner) and part.classifier.knows_margins:
+            return part.classifier
+    return None
 
 
 def _parse_one(part: str, spec: str) -> Pruner:

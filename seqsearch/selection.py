@@ -1,7 +1,5 @@
 """Beam selection: the best nodes of a rank, kept diverse."""
 
-from collections.abc import Hashable
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,6 +11,7 @@ def select(
     scores: NDArray[np.float64],
     nodes: Nodes,
     settings: SearchSettings,
+    spare: float = 1.0,
 ) -> NDArray[np.intp]:
     """Return the positions of the nodes that go on, best first.
 
@@ -30,28 +29,51 @@ def select(
         The n nodes.
     settings : SearchSettings
         `beam_width` and the caps.
+    spare : float
+        Factor on `beam_width`, `max_per_parent` and `max_per_cell`, rounded up.
 
     Returns
     -------
     (k,) intp
-        At most `beam_width` positions.
+        At most `beam_width` times `spare` positions.
     """
-    cell = np.floor(nodes.t_arr_mjd2000 / settings.cell_days).astype(np.int64)
+    width, per_parent, per_cell = (
+        int(np.ceil(cap * spare))
+        for cap in (settings.beam_width, settings.max_per_parent, settings.max_per_cell)
+    )
+    # Cells, and sets of bodies, become numbers once; the walk itself is over plain integers.
+    epoch = np.floor(nodes.t_arr_mjd2000 / settings.cell_days).astype(np.int64)
+    cell = _numbered(np.column_stack([nodes.row, epoch]))
+    kind = _numbered(np.column_stack([cell, np.sort(nodes.visited, axis=1)]))
+    parent = _numbered(nodes.parent_id[:, None])
+    of_parent, of_cell, of_kind = ([0] * len(nodes) for _ in range(3))
     taken: list[int] = []
-    counts: dict[Hashable, int] = {}
-    for i in np.argsort(scores, kind="stable"):
-        by_parent = ("parent", int(nodes.parent_id[i]))
-        by_cell = ("cell", int(nodes.row[i]), int(cell[i]))
-        by_set = ("set", int(nodes.row[i]), int(cell[i]), tuple(np.sort(nodes.visited[i])))
-        if (
-            counts.get(by_parent, 0) >= settings.max_per_parent
-            or counts.get(by_cell, 0) >= settings.max_per_cell
-            or by_set in counts
-        ):
+    order = np.argsort(scores, kind="stable")
+    walk = zip(
+        order.tolist(),
+        parent[order].tolist(),
+        cell[order].tolist(),
+        kind[order].tolist(),
+        strict=True,
+    )
+    for i, p, c, k in walk:
+        if of_kind[k] or of_parent[p] >= per_parent or of_cell[c] >= per_cell:
             continue
-        for key in (by_parent, by_cell, by_set):
-            counts[key] = counts.get(key, 0) + 1
-        taken.append(int(i))
-        if len(taken) == settings.beam_width:
+        of_parent[p] += 1
+        of_cell[c] += 1
+        of_kind[k] += 1
+        taken.append(i)
+        if len(taken) == width:
             break
     return np.asarray(taken, dtype=np.intp)
+
+
+def _numbered(keys: NDArray[np.int64]) -> NDArray[np.intp]:
+    """Return (n,) the same number, 0 to n - 1, for equal rows of (n, k) keys."""
+    if len(keys) == 0:
+        return np.zeros(0, dtype=np.intp)
+    order = np.lexsort(keys.T)
+    new = np.any(np.diff(keys[order], axis=0) != 0, axis=1)
+    number = np.empty(len(keys), dtype=np.intp)
+    number[order] = np.concatenate([[0], np.cumsum(new)])
+    return number

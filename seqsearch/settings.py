@@ -31,6 +31,13 @@ class SearchSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
         Transfer time in the orbital metric.
     tof_days_min, tof_days_max, tof_days_step : float
         Grid of flight times.
+    coarse_flight_times : int
+        Flight times at which a predictor is asked to find a target's shortest one.
+    flight_time_stretches : tuple of float
+        Flight times proposed for each target, in units of the shortest that a predictor
+        thinks flyable; longer ones save propellant.
+    margin_reserve : float
+        By how much predicted margins of proposed hops exceed 1.
     departure_delays_days : tuple of float
         Waits beyond the shortest stay that are tried.
     pruner : str
@@ -76,6 +83,9 @@ class SearchSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
     tof_days_min: _Positive = 60.0
     tof_days_max: _Positive = 300.0
     tof_days_step: _Positive = 15.0
+    coarse_flight_times: Annotated[int, Meta(ge=4)] = 9
+    flight_time_stretches: tuple[Annotated[float, Meta(ge=1)], ...] = (1.0, 1.06, 1.14, 1.25, 1.4)
+    margin_reserve: Annotated[float, Meta(ge=0)] = 0.002
     departure_delays_days: tuple[Annotated[float, Meta(ge=0)], ...] = (0.0,)
     pruner: str = "lambert:1.3,mima2:0.97"
     solver: str = "fast"

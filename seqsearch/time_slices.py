@@ -43,7 +43,7 @@ class TimeSliceFrontier:
         self._ranking = ranking
         self._slices: dict[int, Nodes] = {}
 
-    def admit(self, nodes: Nodes, /) -> NDArray[np.intp]:
+    def admit(self, nodes: Nodes, /, spare: float = 1.0) -> NDArray[np.intp]:
         """Return the positions of the nodes that are among the best of their slice."""
         admitted: list[NDArray[np.intp]] = []
         for number, positions in self._by_slice(nodes):
@@ -51,7 +51,7 @@ class TimeSliceFrontier:
             waiting = self._slices.get(number)
             if waiting is not None:
                 rivals = Nodes.concatenate([rivals, waiting])
-            chosen = self._best(rivals)
+            chosen = self._best(rivals, spare)
             admitted.append(positions[chosen[chosen < len(positions)]])
         return np.concatenate(admitted) if admitted else np.zeros(0, dtype=np.intp)
 
@@ -78,10 +78,10 @@ class TimeSliceFrontier:
             return None
         return Nodes.concatenate([self._slices[number] for number in sorted(self._slices)])
 
-    def _best(self, nodes: Nodes) -> NDArray[np.intp]:
+    def _best(self, nodes: Nodes, spare: float = 1.0) -> NDArray[np.intp]:
         progress = nodes.depth / self._settings.nominal_visits
         scores = self._ranking.score(nodes, self._problem) - progress * self._worth_of_a_tour()
-        return select(scores, nodes, self._settings)
+        return select(scores, nodes, self._settings, spare)
 
     def _worth_of_a_tour(self) -> float:
         """Return the score of a tour that used up everything."""

@@ -1,7 +1,7 @@
 """The `LegPredictor` protocol: what a search asks to order candidate legs before it solves any."""
 
 from dataclasses import dataclass
-from typing import Protocol, final, runtime_checkable
+from typing import Final, Protocol, final, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,15 @@ class LegPredictor(Protocol):
 
     def final_mass(self, legs: Legs, /) -> NDArray[np.float64]:
         """Return (n,) kg, the estimate of the mass at arrival with least propellant."""
+        ...
+
+
+@runtime_checkable
+class QuickPredictor(LegPredictor, Protocol):
+    """A predictor that also has cheap answers, a few percent wrong."""
+
+    def quick_margin(self, legs: Legs, /) -> NDArray[np.float64]:
+        """Return (n,) a cheap estimate of m*/m0; NaN where nothing is known."""
         ...
 
 
@@ -76,4 +85,37 @@ def lambert_final_mass(legs: Legs) -> NDArray[np.float64]:
     burnt = legs.m0 * -np.expm1(-np.nan_to_num(delta_v, nan=np.inf) / legs.exhaust_velocity)
     most = legs.thrust / legs.exhaust_velocity * legs.tof_s
     estimate: NDArray[np.float64] = np.maximum(legs.m0 - np.minimum(burnt, most), legs.m_dry)
+    return estimate
+
+
+_BURN: Final = (4.18, 0.82)
+"""Fit to the minimum-propellant solutions of 2400 legs of a GTOC7 search: 2 % off on average."""
+
+
+def bounded_final_mass(legs: Legs, margin: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Estimate the masses at arrival from margins.
+
+    At margin M a spacecraft can fly what the heaviest one flies, with 1/M of its thrust:
+    it burns at most 1/M of what the engine can in the time of flight. Far from the
+    boundary the propellant comes down to that of impulses, `lambert_final_mass`. Between
+    the two, the share of their difference is 1 / (1 + a (M - 1)^b) with a = 4.18 and b = 0.82,
+    a fit to solved legs.
+
+    Parameters
+    ----------
+    legs : Legs
+        n legs.
+    margin : (n,) float64
+        m*/m0; below 1 the answer is that at 1.
+
+    Returns
+    -------
+    (n,) float64, kg
+        Not held at the dry mass. NaN where the margin is.
+    """
+    beyond = np.maximum(margin - 1.0, 0.0)
+    most = legs.thrust / legs.exhaust_velocity * legs.tof_s / (1.0 + beyond)
+    least = np.minimum(legs.m0 - lambert_final_mass(legs), most)
+    a, b = _BURN
+    estimate: NDArray[np.float64] = legs.m0 - least - (most - least) / (1.0 + a * beyond**b)
     return estimate

@@ -120,6 +120,16 @@ class MarginEstimator:
         inside[rows] = self._inside(X[rows])
         return log_margin, doubt, inside
 
+    def quick_log_margin(self, legs: Legs) -> _Array:
+        """Return (n,) log(m* / m0) by the quick net; NaN without features or out of the domain."""
+        X, hint = quick_features(legs)
+        log_margin = np.full(len(legs), np.nan)
+        rows = np.flatnonzero(np.isfinite(hint))
+        rows = rows[self._inside(X[rows])]
+        correction, _ = self._quick(X[rows])
+        log_margin[rows] = log_acceleration(legs, legs.m0)[rows] - hint[rows] - correction
+        return log_margin
+
     def predict(self, legs: Legs) -> LegPrediction:
         """Return all answers for n legs from one computation of their features."""
         X, hint = margin_features(legs)
