@@ -6,7 +6,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
-from feasibility import command_evaluate, command_study, command_train
+from feasibility import (
+    command_assess,
+    command_evaluate,
+    command_retrain,
+    command_study,
+    command_train,
+)
 from feasibility.errors import InputError, MissingDependencyError
 from feasibility.sims_flanagan.prepare import prefer_fast_compilation
 
@@ -19,6 +25,8 @@ judge classifiers, repeat the experiments of the paper.
   feasibility protocols table1            print a protocol, to make your own
   feasibility train data/search --model margin --out mine.seqmodel
   feasibility evaluate mine.seqmodel data/search
+  feasibility assess probe.toml           good enough for my spacecraft?
+  feasibility retrain probe.toml --out probe.seqmodel
 """
 
 _GENERATE: Final = """\
@@ -107,6 +115,8 @@ def _parser() -> argparse.ArgumentParser:
     protocols.set_defaults(run=_protocols)
     command_train.add_parser(commands)
     command_evaluate.add_parser(commands)
+    command_assess.add_parser(commands)
+    command_retrain.add_parser(commands)
     command_study.add_parser(commands)
     return parser
 

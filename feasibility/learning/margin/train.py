@@ -417,8 +417,8 @@ def _fit(
     if start is not None:
         with torch.no_grad():
             for i, part in enumerate(linear):
-                part.weight.copy_(torch.from_numpy(start[f"weight_{i}"]))
-                part.bias.copy_(torch.from_numpy(start[f"bias_{i}"]))
+                part.weight.copy_(torch.tensor(start[f"weight_{i}"]))
+                part.bias.copy_(torch.tensor(start[f"bias_{i}"]))
     network = network.to(device)
     optimiser = torch.optim.AdamW(
         network.parameters(), lr=recipe.learning_rate, weight_decay=_WEIGHT_DECAY
