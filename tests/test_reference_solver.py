@@ -1,5 +1,7 @@
 """The reference leg solver: gradients, closure, physics of m*, and failures as rows."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -9,7 +11,7 @@ from scipy.integrate import solve_ivp
 from feasibility import InputError, Legs, max_initial_mass, optimise
 from feasibility.constants import AU, EARTH_VELOCITY, MU_SUN
 from feasibility.orbits import classical_to_cartesian
-from feasibility.sims_flanagan import LegSolutions, Status, solve_max_initial_mass
+from feasibility.sims_flanagan import LegSolutions, Status, reference, solve_max_initial_mass
 from feasibility.sims_flanagan.pygmo_problems import MaximumMassProblem, MinimumPropellantProblem
 from feasibility.sims_flanagan.pykep_leg import confirm, scaled_leg
 from feasibility.sims_flanagan.reference import (
@@ -17,6 +19,7 @@ from feasibility.sims_flanagan.reference import (
     reference_min_propellant,
 )
 from feasibility.sims_flanagan.solutions import MISMATCH_TOLERANCE, THROTTLE_TOLERANCE
+from feasibility.sims_flanagan.starts import FROM_GUESS
 
 
 def main_belt_legs(n: int, seed: int, tof_days: tuple[float, float]) -> Legs:
@@ -159,6 +162,28 @@ def test_more_starts_never_lower_the_mass(legs):
     assert more.m0[0] >= one.m0[0]
 
 
+def test_a_guess_is_one_more_start_and_never_lost(legs, heaviest, monkeypatch):
+    rows = np.array([0, 2])
+    guess = heaviest.take(rows)
+    monkeypatch.setattr(reference, "reference_starts", lambda *_: iter(()))
+    started = reference_max_initial_mass(legs.take(rows), guess=guess, agreement=1)
+    assert (started.m0 >= guess.m0).all()
+    assert (started.start == FROM_GUESS).all()
+    # Neither a guess that does not close nor one that is a failed row is taken for a solution.
+    wrong = dataclasses.replace(guess, m0=2.0 * guess.m0, m_final=2.0 * guess.m_final)
+    monkeypatch.setattr(reference, "_solve_maximum", lambda *_: None)
+    assert not reference_max_initial_mass(legs.take(rows), guess=wrong).converged.any()
+    failed = LegSolutions.unsolved(2, 20)
+    assert not reference_max_initial_mass(legs.take(rows), guess=failed).converged.any()
+
+
+def test_a_guess_has_the_number_of_segments(legs):
+    guess = reference_max_initial_mass(legs.take([0]), n_segments=7, agreement=1)
+    started = solve_max_initial_mass(legs.take([0]), method="reference", guess=guess)
+    assert started.throttles.shape == (1, 7, 3)
+    assert started.m0[0] >= guess.m0[0]
+
+
 def test_the_same_seed_gives_the_same_solution(legs):
     runs = [
         reference_max_initial_mass(
@@ -252,6 +277,14 @@ def test_number_of_segments_is_free(legs):
         (lambda legs: reference_max_initial_mass(legs, n_segments=1), "n_segments.*1"),
         (lambda legs: reference_max_initial_mass(legs, n_random=2), "n_random.*rng"),
         (lambda legs: reference_max_initial_mass(legs, agreement=0), "agreement 0"),
+        (
+            lambda legs: reference_max_initial_mass(legs, guess=LegSolutions.unsolved(2, 20)),
+            "2 guesses for 6 legs",
+        ),
+        (
+            lambda legs: solve_max_initial_mass(legs, guess=LegSolutions.unsolved(6, 20)),
+            "guess: method 'fast' takes none",
+        ),
         (
             lambda legs: reference_min_propellant(legs, guess=LegSolutions.unsolved(2, 20)),
             "2 guesses for 6 legs",

@@ -5,6 +5,7 @@ Slow, plain and independent of the fast solver, which it checks and backs up.
 
 import functools
 import time
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,6 +24,7 @@ from feasibility.sims_flanagan.solutions import (
 from feasibility.sims_flanagan.starts import (
     FIRST_HOP,
     FIRST_RANDOM,
+    FROM_GUESS,
     N_HOPS,
     bends,
     reference_starts,
@@ -46,6 +48,7 @@ class _Closed(NamedTuple):
 def reference_max_initial_mass(
     legs: Legs,
     *,
+    guess: LegSolutions | None = None,
     n_segments: int = N_SEGMENTS,
     rng: np.random.Generator | None = None,
     n_random: int = 0,
@@ -64,8 +67,11 @@ def reference_max_initial_mass(
     ----------
     legs : Legs
         n legs.
+    guess : LegSolutions, optional
+        Solutions of the same legs, such as the fast solver's: one more start for each row
+        that has converged, and kept where nothing better is found.
     n_segments : int
-        Segments of the leg, at least 2.
+        Segments of the leg, at least 2; those of `guess` if that is given.
     rng : numpy.random.Generator, optional
         Source of the random starts.
     n_random : int
@@ -79,17 +85,23 @@ def reference_max_initial_mass(
     LegSolutions
         n rows; `start` is an index of `starts`: 0 to 4 are Lambert branches (0
         revolutions, then low and high path of 1 and 2), then the tangential, the
-        wandering, the disturbed and the random ones.
+        wandering, the disturbed, the given and the random ones.
 
     Raises
     ------
     InputError
-        `n_segments` is below 2, `agreement` below 1, or random starts are asked
-        for without `rng`.
+        `n_segments` is below 2, `agreement` below 1, `guess` has another number of
+        rows, or random starts are asked for without `rng`.
     MissingDependencyError
         pykep or pygmo is not installed.
     """
     _check_segments(n_segments)
+    if guess is not None:
+        if len(guess) != len(legs):
+            raise InputError(
+                f"reference_max_initial_mass: {len(guess)} guesses for {len(legs)} legs"
+            )
+        n_segments = guess.n_segments
     if agreement < 1:
         raise InputError(f"reference_max_initial_mass: agreement {agreement}, expected at least 1")
     if n_random and rng is None:
@@ -99,6 +111,9 @@ def reference_max_initial_mass(
         began = time.process_time()
         leg = scaled_leg(legs, row, float(legs.m0[row]), n_segments)
         masses: list[float] = []
+        if guess is not None and guess.converged[row]:
+            for found in _from_guess(legs, row, guess):
+                _keep_best(solutions, row, found, FROM_GUESS, masses)
         for start, impulses in reference_starts(leg, n_random, rng):
             if start < FIRST_RANDOM and _agreed(masses, agreement):
                 continue
@@ -120,6 +135,14 @@ def _hop(legs: Legs, row: int, solutions: LegSolutions, masses: list[float]) -> 
         final = float(solutions.m_final[row] / solutions.m0[row])
         found = _solve_maximum(legs, row, throttles, float(solutions.m0[row]), final)
         _keep_best(solutions, row, found, FIRST_HOP + number, masses)
+
+
+def _from_guess(legs: Legs, row: int, guess: LegSolutions) -> Iterator[_Closed | None]:
+    """Yield the guess itself, if pykep's leg confirms it, and what IPOPT makes of it."""
+    throttles, mass = guess.throttles[row], float(guess.m0[row])
+    m_final = float(guess.m_final[row])
+    yield _confirmed(legs, row, throttles.ravel(), mass, m_final)
+    yield _solve_maximum(legs, row, throttles, mass, m_final / mass)
 
 
 def _keep_best(

@@ -53,17 +53,38 @@ def max_initial_mass(legs: Legs, *, method: str = DEFAULT_METHOD) -> NDArray[np.
     return solve_max_initial_mass(legs, method=method).m0
 
 
-def solve_max_initial_mass(legs: Legs, *, method: str = DEFAULT_METHOD) -> LegSolutions:
+def solve_max_initial_mass(
+    legs: Legs, *, method: str = DEFAULT_METHOD, guess: LegSolutions | None = None
+) -> LegSolutions:
     """Find the maximum initial mass of each leg, with throttles and masses.
 
-    Parameters and errors as for `max_initial_mass`.
+    Parameters
+    ----------
+    legs : Legs
+        n legs; their `m0` and `m_dry` play no part.
+    method : str
+        Solver, as for `max_initial_mass`.
+    guess : LegSolutions, optional
+        Solutions of the same legs, from which the reference starts too; the fast
+        solver takes none.
 
     Returns
     -------
     LegSolutions
         n rows, each confirmed by pykep's leg; failed solves are rows too.
+
+    Raises
+    ------
+    InputError
+        `method` is unknown, or `guess` does not fit the legs or the method.
+    MissingDependencyError
+        pykep or pygmo is not installed.
     """
-    solutions: LegSolutions = _solver(_MAXIMUM_MASS, method)(legs)
+    solver = _solver(_MAXIMUM_MASS, method)
+    if guess is not None and method != "reference":
+        raise InputError(f"guess: method {method!r} takes none, expected method 'reference'")
+    options = {} if guess is None else {"guess": guess}
+    solutions: LegSolutions = solver(legs, **options)
     return solutions
 
 

@@ -42,7 +42,10 @@ N_HOPS: Final = 10
 FIRST_HOP: Final = FIRST_WANDERING + N_WANDERING
 """Index of the first of these."""
 
-FIRST_RANDOM: Final = FIRST_HOP + N_HOPS
+FROM_GUESS: Final = FIRST_HOP + N_HOPS
+"""Index of the start from a solution that the caller gives."""
+
+FIRST_RANDOM: Final = FROM_GUESS + 1
 """Index of the first random start."""
 
 _KNOTS = 4
