@@ -18,7 +18,7 @@ from typing import Final, final
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.pruners.predictor import LegPredictor
+from feasibility.pruners.predictor import LegPredictor, QuickPredictor
 from seqsearch.audit_estimate import RankAudit, Stratum
 from seqsearch.deadline import Deadline
 from seqsearch.expansion import Candidates, reached
@@ -81,39 +81,33 @@ class RankSample:
         predictor: LegPredictor | None,
     ) -> None:
         seed = int(copy.deepcopy(rng).integers(2**63))
-        self._rng = np.random.default_rng([seed, rank_index])
+        streams = [np.random.default_rng([seed, rank_index, stream]) for stream in range(4)]
+        self._rng, self._thinner = streams[:2]
         self._solves = solves
         self._predictor = predictor
-        self._n_pruned = 0
-        self._lots = np.zeros(0)
-        self._thinned: Candidates | None = None
+        self._pruned = _Reservoir(_THINNED, streams[2])
+        self._kept = _Reservoir(-(-solves // 2), streams[3])
+        self._stands_for = 1.0
+
+    def thin(self, n: int, of: int) -> NDArray[np.bool_]:
+        """Choose which of the next n candidates to offer, for a rank of about `of` in all.
+
+        Whoever uses it does so for every candidate and with the same `of`; saves
+        making and judging candidates that would not stay anyway.
+        """
+        chance = min(1.0, _THINNED / max(1, of))
+        self._stands_for = 1.0 / chance
+        return self._thinner.random(n) < chance
 
     def offer(self, block: Candidates, kept: NDArray[np.bool_]) -> None:
-        """Look at the next n candidates and at the pruner's answer, (n,) True for kept.
-
-        The candidates with the smallest random lots of all stay.
-        """
-        pruned = np.flatnonzero(~kept)
-        self._n_pruned += len(pruned)
-        n_before = len(self._lots)
-        lots = np.concatenate([self._lots, self._rng.random(len(pruned))])
-        if len(lots) > _THINNED:
-            stay = np.sort(np.argpartition(lots, _THINNED - 1)[:_THINNED])
-        else:
-            stay = np.arange(len(lots))
-        new = block.take(pruned[stay[stay >= n_before] - n_before])
-        if self._thinned is None:
-            self._thinned = new
-        else:
-            old = self._thinned.take(stay[stay < n_before])
-            self._thinned = Candidates.concatenate([old, new])
-        self._lots = lots[stay]
+        """Look at the next n candidates, of which (n,) `kept` were not pruned."""
+        self._pruned.offer(block, np.flatnonzero(~kept))
+        self._kept.offer(block, np.flatnonzero(kept))
 
     def solve(
         self,
         problem: TourProblem,
         nodes: Nodes,
-        kept: Candidates | None,
         optimiser: LegOptimiser,
         solver: str,
         deadline: Deadline,
@@ -125,8 +119,6 @@ class RankSample:
         ----------
         problem, nodes
             Problem, and the nodes that the candidates start from.
-        kept : Candidates or None
-            All candidates that the pruner kept.
         optimiser, solver, deadline
             As for the candidates that were kept.
         contends : callable
@@ -138,7 +130,7 @@ class RankSample:
             None where the deadline came first: what is solved by then is no
             random sample.
         """
-        pruned, rest = self._pruned_groups(), self._kept_groups(kept)
+        pruned, rest = self._pruned_groups(), self._kept_groups()
         groups = [*pruned, *rest]
         if not groups:
             return RankAudit(pruned=(), kept=())
@@ -166,34 +158,65 @@ class RankSample:
         return RankAudit(pruned=strata[: len(pruned)], kept=strata[len(pruned) :])
 
     def _pruned_groups(self) -> list[_Group]:
-        """Sort the thinned candidates by predicted margin and draw from each stratum."""
-        thinned = self._thinned
-        if thinned is None or len(thinned) == 0:
+        """Sort the pruned candidates by predicted margin and draw from each stratum."""
+        thinned = self._pruned.candidates
+        if thinned is None:
             return []
         strata = np.full(len(thinned), _UNKNOWN)
         if self._predictor is not None:
-            margins = [self._predictor.margin(legs) for legs in thinned.hops.stages]
+            predictor = self._predictor
+            ask = (
+                predictor.quick_margin
+                if isinstance(predictor, QuickPredictor)
+                else predictor.margin
+            )
             # A NaN in any stage makes the smallest one a NaN.
-            margin = np.min(margins, axis=0)
+            margin = np.min([ask(legs) for legs in thinned.hops.stages], axis=0)
             known = ~np.isnan(margin)
             strata[known] = np.searchsorted(_MARGINS, margin[known], "right")
         members = [np.flatnonzero(strata == s) for s in range(len(_LABELS))]
         wanted = _allot(np.array([len(rows) for rows in members]), self._solves)
-        stands_for = self._n_pruned / len(thinned)
+        stands_for = self._stands_for * self._pruned.seen / len(thinned)
         return [
             _Group(label, stands_for * len(rows), thinned.take(self._draw(rows, n)))
             for label, rows, n in zip(_LABELS, members, wanted, strict=True)
             if n
         ]
 
-    def _kept_groups(self, kept: Candidates | None) -> list[_Group]:
-        if kept is None or len(kept) == 0:
-            return []
-        rows = self._draw(np.arange(len(kept)), min(len(kept), -(-self._solves // 2)))
-        return [_Group("kept", len(kept), kept.take(rows))]
+    def _kept_groups(self) -> list[_Group]:
+        drawn = self._kept.candidates
+        return [] if drawn is None else [_Group("kept", self._stands_for * self._kept.seen, drawn)]
 
     def _draw(self, rows: NDArray[np.intp], n: int) -> NDArray[np.intp]:
         return np.sort(self._rng.choice(rows, n, replace=False))
+
+
+@final
+class _Reservoir:
+    """A random sample without replacement of candidates that pass by: the smallest lots stay."""
+
+    def __init__(self, size: int, rng: np.random.Generator) -> None:
+        self.candidates: Candidates | None = None
+        self.seen = 0
+        self._size = size
+        self._rng = rng
+        self._lots = np.zeros(0)
+
+    def offer(self, block: Candidates, rows: NDArray[np.intp]) -> None:
+        n_before = len(self._lots)
+        self.seen += len(rows)
+        lots = np.concatenate([self._lots, self._rng.random(len(rows))])
+        stay = np.arange(len(lots))
+        if len(lots) > self._size:
+            stay = np.sort(np.argpartition(lots, self._size - 1)[: self._size])
+        new = rows[stay[stay >= n_before] - n_before]
+        self._lots = lots[stay]
+        if len(new) == 0:
+            return
+        parts = [block.take(new)]
+        if self.candidates is not None:
+            parts.insert(0, self.candidates.take(stay[stay < n_before]))
+        self.candidates = Candidates.concatenate(parts)
 
 
 def _allot(sizes: NDArray[np.intp], solves: int) -> list[int]:

@@ -15,7 +15,7 @@ from feasibility.pruners.predictor import LegPredictor
 from seqsearch.audit import RankSample
 from seqsearch.counters import RankCounters
 from seqsearch.deadline import Deadline
-from seqsearch.expanders import Expanded, Expander, ForecastExpander, GridExpander
+from seqsearch.expanders import Expander, ForecastExpander, GridExpander
 from seqsearch.expansion import Candidates, reached
 from seqsearch.frontier import Frontier, make_frontier
 from seqsearch.nodes import Nodes
@@ -217,7 +217,7 @@ class _Search:
                 counters.feasible = len(expanded.optimised.candidate)
                 state.solves += expanded.optimised.n_legs
             if sample is not None:
-                self._audit(sample, frontier, nodes, expanded, found, counters)
+                self._audit(sample, frontier, nodes, found, counters)
             if found is not None:
                 self._advance(frontier, found, counters)
             counters.cut = self._deadline.passed()
@@ -258,7 +258,6 @@ class _Search:
         sample: RankSample,
         frontier: Frontier,
         nodes: Nodes,
-        expanded: Expanded | None,
         found: "_Found | None",
         counters: RankCounters,
     ) -> None:
@@ -271,7 +270,6 @@ class _Search:
         counters.audit = sample.solve(
             self._problem,
             nodes,
-            None if expanded is None else expanded.candidates,
             self._optimiser,
             self._state.settings.solver,
             self._deadline,

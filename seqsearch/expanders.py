@@ -14,8 +14,9 @@ from seqsearch.audit import RankSample
 from seqsearch.counters import RankCounters
 from seqsearch.deadline import Deadline
 from seqsearch.expansion import Candidates, expand, reached
-from seqsearch.forecast import Forecast, Prospects
+from seqsearch.forecast import Forecast, Prospects, Survey
 from seqsearch.frontier import Frontier
+from seqsearch.margin_curves import flight_times
 from seqsearch.nodes import Nodes
 from seqsearch.optimisation import LegOptimiser, Optimised
 from seqsearch.ranking import Ranking
@@ -239,7 +240,7 @@ class ForecastExpander:
             counters.questions += survey.questions
             counters.proposed += survey.proposed
             if sample is not None:
-                sample.offer(survey.longest, survey.hopeful)
+                self._show(sample, nodes, survey, settings)
             if len(survey.prospects):
                 prospects.append(survey.prospects)
             if len(survey.unknown):
@@ -248,6 +249,27 @@ class ForecastExpander:
                 break
         counters.seconds_expand += time.perf_counter() - clock
         return prospects, unknown
+
+    def _show(
+        self, sample: RankSample, nodes: Nodes, survey: Survey, settings: SearchSettings
+    ) -> None:
+        """Show the audit some of the hops, at all flight times, and what is thought of them."""
+        count = settings.coarse_flight_times
+        pairs = survey.longest
+        expected = len(nodes) * settings.neighbours * len(settings.departure_delays_days) * count
+        pair, k = np.divmod(np.flatnonzero(sample.thin(len(pairs) * count, expected)), count)
+        longest = pairs.hops.tof_days[pair]
+        times = flight_times(np.full(len(pair), settings.tof_days_min), longest, count)
+        parent, target = pairs.parent[pair], pairs.target[pair]
+        hops = self._problem.hops(
+            nodes, parent, target, pairs.hops.t_dep_mjd2000[pair], times[np.arange(len(pair)), k]
+        )
+        kept = survey.hopeful[pair]
+        rows = np.flatnonzero(kept)
+        kept[rows] = self._forecast.flyable(hops.take(rows), settings)
+        rows = np.flatnonzero(kept)
+        kept[rows] = keep_hops(self._pruner, hops.take(rows))
+        sample.offer(Candidates(parent, target, hops), kept)
 
     def _best(
         self,
@@ -280,11 +302,14 @@ class ForecastExpander:
         return parts
 
 
-def keep_hops(pruner: AllOf, hops: Hops, counters: RankCounters) -> NDArray[np.bool_]:
+def keep_hops(
+    pruner: AllOf, hops: Hops, counters: RankCounters | None = None
+) -> NDArray[np.bool_]:
     """Return (n,) bool, where all stages survive; each stage is asked about survivors only."""
     mask = np.ones(len(hops), dtype=np.bool_)
     for legs in hops.stages:
         rows = np.flatnonzero(mask)
         mask[rows], pruned = pruner.keep_with_counts(legs.take(rows))
-        counters.count_pruned(pruned)
+        if counters is not None:
+            counters.count_pruned(pruned)
     return mask

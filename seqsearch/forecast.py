@@ -236,6 +236,12 @@ class Forecast:
         )
         return candidates, np.concatenate([m_final for _, m_final in parts]), pair
 
+    def flyable(self, hops: Hops, settings: SearchSettings) -> NDArray[np.bool_]:
+        """Return (n,) whether the good answers do not speak against n hops."""
+        log = log_margin(self._predictor.margin, hops)
+        flyable: NDArray[np.bool_] = np.isnan(log) | (log >= np.log1p(settings.margin_reserve))
+        return flyable
+
     def grid(self, nodes: Nodes, longest: Candidates, settings: SearchSettings) -> Candidates:
         """Return hops with all flight times of the grid up to those of the given hops."""
         tof = settings.tof_days()

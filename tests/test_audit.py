@@ -125,12 +125,9 @@ def _solve(blocks, solves=40, predictor=None, seed=0, optimiser=None, limit_s=No
     sample = RankSample(np.random.default_rng(seed), 3, solves, predictor)
     for block in blocks:
         sample.offer(block, block.hops.stages[0].tof_days >= 97.0)
-    everything = Candidates.concatenate(blocks)
-    kept = everything.take(everything.hops.stages[0].tof_days >= 97.0)
     return sample.solve(
         PROBLEM,
         START,
-        kept if len(kept) else None,
         optimiser or _ToyOptimiser(),
         "toy",
         Deadline(limit_s),
@@ -157,7 +154,7 @@ def test_the_sample_does_not_depend_on_blocks(cuts):
 
 def test_strata_follow_the_predicted_margin():
     tof = np.concatenate([_tofs(1000), np.full(3000, 20.0)])
-    audit = _solve([_candidates(tof)], predictor=_ByTof())
+    audit = _solve([_candidates(tof)], solves=120, predictor=_ByTof())
     strata = {stratum.label: stratum for stratum in audit.pruned}
     assert set(strata) == {"below 0.7", "0.7 to 0.9", "0.9 to 1", "unknown"}
     counts = {
@@ -167,11 +164,11 @@ def test_strata_follow_the_predicted_margin():
         "unknown": (tof < 10).sum(),
     }
     assert {label: s.candidates for label, s in strata.items()} == counts
-    assert sum(s.solved for s in audit.pruned) == 40
+    assert sum(s.solved for s in audit.pruned) == 120
     assert [s.label for s in audit.pruned if s.flyable] == ["0.9 to 1"]
     near = strata["0.9 to 1"]
     assert 0 < near.contenders < near.flyable
-    assert audit.kept[0].solved == audit.kept[0].flyable == 20
+    assert audit.kept[0].solved == audit.kept[0].flyable == 60
 
 
 def test_a_rank_beyond_what_is_thinned_out_is_weighted():
@@ -197,6 +194,20 @@ def test_few_candidates_are_all_solved():
     assert estimate.flyable_pruned == 2
     assert estimate.flyable_kept == 1
     assert estimate.contenders == 1
+
+
+def test_candidates_may_be_thinned_out_before_they_are_made():
+    tof = _tofs(200_000)
+    sample = RankSample(np.random.default_rng(2), 0, 200, _ByTof())
+    for part in np.split(tof, 10):
+        some = part[sample.thin(len(part), len(tof))]
+        sample.offer(_candidates(some), some >= 97.0)
+    audit = sample.solve(
+        PROBLEM, START, _ToyOptimiser(), "toy", Deadline(None), lambda n: n.row < 0
+    )
+    for strata, count in ((audit.pruned, (tof < 97).sum()), (audit.kept, (tof >= 97).sum())):
+        # Ten thousand of two hundred thousand are looked at: some percent off.
+        assert sum(stratum.candidates for stratum in strata) == pytest.approx(count, rel=0.15)
 
 
 def test_a_deadline_leaves_no_biased_sample():
