@@ -15,6 +15,8 @@ EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
         ("search_demo.py", ["--bodies", "1500", "--days", "500", "--beam-width", "5"], "verified"),
         ("custom_pruner.py", ["--bodies", "1500", "--days", "400"], "keeps the contract"),
         ("custom_search.py", ["--legs", "2"], "flyable\n  S"),
+        ("monte_carlo_tree_search.py", ["15"], "planned legs flown"),
+        ("scikit_learn_pruner.py", ["--legs", "1200"], "verified"),
     ],
 )
 def test_example(script, arguments, promise):
