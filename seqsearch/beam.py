@@ -45,7 +45,7 @@ class SearchResult:
     counters : list of RankCounters
         One record for each rank of each pass.
     stopped : str
-        ``"complete"``, ``"time limit"`` or ``"interrupted"``.
+        ``"complete"``, ``"time limit"``, ``"solve limit"`` or ``"interrupted"``.
     """
 
     tour: Tour
@@ -66,6 +66,7 @@ def search(
     executor: Executor | None = None,
     threads: int = 1,
     time_limit_s: float | None = None,
+    max_solves: int | None = None,
     resume: SearchState | None = None,
     on_rank: Callable[[SearchState], None] | None = None,
 ) -> SearchResult:
@@ -95,13 +96,18 @@ def search(
     threads : int
         Threads of this process that ask the predictor.
     time_limit_s : float, optional
-        Stop after this wall-clock time with the best tour so far. Passes
-        beyond ``settings.passes`` are then run until the time is up.
+        Stop after this wall-clock time, sessions before included, with the best
+        tour so far. Passes beyond ``settings.passes`` are then run until the
+        time is up.
+    max_solves : int, optional
+        Stop when this many legs were given to the solver, the audit's not
+        counted; otherwise as `time_limit_s`.
     resume : SearchState, optional
         Go on from here. The state is changed.
     on_rank : callable, optional
-        Called with the state after each rank and before the first one of a
-        pass; the state changes afterwards.
+        Called with the state after each rank; the state changes afterwards.
+        A state whose last rank is `cut` does not lead to the result of an
+        uninterrupted search.
 
     Returns
     -------
@@ -114,6 +120,10 @@ def search(
     InputError
         Settings that do not fit the problem, or a pruner specification that
         cannot be read.
+    PrunerContractError
+        The pruner raised, or returned something else than a boolean a leg.
+    BrokenExecutor
+        The workers of `executor` died.
     """
     settings = settings or SearchSettings()
     if beam_width is not None:
@@ -130,12 +140,13 @@ def search(
         predictor or predictor_of(pruner),
         ranking,
         LegOptimiser(executor),
-        Deadline(time_limit_s),
+        Deadline(None if time_limit_s is None else time_limit_s - state.spent_s),
+        max_solves,
         state,
         rng,
         on_rank,
         threads,
-    ).run(endless=time_limit_s is not None)
+    ).run(endless=time_limit_s is not None or max_solves is not None)
 
 
 @final
@@ -151,6 +162,7 @@ class _Search:
         ranking: Ranking | None,
         optimiser: LegOptimiser,
         deadline: Deadline,
+        max_solves: int | None,
         state: SearchState,
         rng: np.random.Generator,
         on_rank: Callable[[SearchState], None] | None,
@@ -162,6 +174,7 @@ class _Search:
         self._predictor = predictor
         self._optimiser = optimiser
         self._deadline = deadline
+        self._max_solves = max_solves
         self._state = state
         self._rng = rng
         self._on_rank = on_rank
@@ -186,13 +199,15 @@ class _Search:
                 self._run_pass(state.waiting)
             while (
                 endless or state.pass_number < self._settings.passes
-            ) and not self._deadline.passed():
+            ) and not self._out_of_budget():
                 state.pass_number += 1
                 self._run_pass(self._start_nodes())
         except KeyboardInterrupt:
             stopped = "interrupted"
         if stopped == "complete" and self._deadline.passed():
             stopped = "time limit"
+        elif stopped == "complete" and self._out_of_budget():
+            stopped = "solve limit"
         return SearchResult(self._best_tour(), state.tree, state.counters, stopped)
 
     def _run_pass(self, nodes: Nodes) -> None:
@@ -200,14 +215,14 @@ class _Search:
         state = self._state
         frontier = make_frontier(state.settings, self._problem, self._ranking)
         frontier.push(nodes)
-        while len(nodes := frontier.pop()) and not self._deadline.passed():
+        while len(nodes := frontier.pop()) and not self._out_of_budget():
             counters = RankCounters(
                 pass_number=state.pass_number, rank=int(nodes.depth.max()) + 1, nodes=len(nodes)
             )
             start = time.perf_counter()
             sample = self._sample()
             expanded = self._expander.expand(
-                nodes, frontier, state.settings, counters, sample, self._deadline
+                nodes, frontier, self._affordable(), counters, sample, self._deadline
             )
             found = None
             if expanded is not None and expanded.optimised.solved is not None:
@@ -220,11 +235,23 @@ class _Search:
                 self._audit(sample, frontier, nodes, found, counters)
             if found is not None:
                 self._advance(frontier, found, counters)
-            counters.cut = self._deadline.passed()
+            counters.cut = self._out_of_budget()
             counters.seconds = time.perf_counter() - start
             state.counters.append(counters)
             self._report(frontier)
         state.waiting = None
+
+    def _out_of_budget(self) -> bool:
+        spent = self._max_solves is not None and self._state.solves >= self._max_solves
+        return spent or self._deadline.passed()
+
+    def _affordable(self) -> SearchSettings:
+        """Return the settings of the pass, with no more solves than are left."""
+        settings = self._state.settings
+        if self._max_solves is None:
+            return settings
+        left = self._max_solves - self._state.solves
+        return settings.with_(solves_per_rank=min(left, settings.solves_per_rank))
 
     def _report(self, frontier: Frontier) -> None:
         state = self._state
