@@ -1,18 +1,28 @@
 """The command ``feasibility evaluate``."""
 
 import argparse
+import json
 from pathlib import Path
 from typing import Any, Final
 
+from feasibility.errors import InputError
+
 _DESCRIPTION: Final = """\
-Judge a trained model on the labelled legs of a dataset that it was not trained
-on: accuracy, precision, recall, F1, F10, AUC, balanced accuracy, log loss,
-calibration error, accuracy near the boundary, what it would prune at several
-recalls and, of a margin model, the error of log(m*/m0). With --out, write them
-as metrics.json and metrics.md, with plots of the ROC curve, of the reliability
-and of the margins.
+Judge a trained model on the labelled legs of datasets that it was not trained
+on: accuracy, precision, recall, F1 and F10 (the paper's equations 11 to 14),
+AUC, balanced accuracy, log loss, calibration error, accuracy within 15 % and
+5 % of the boundary, what it would prune at several recalls, processor time
+and, of a margin model, the errors of log(m*/m0) and of the final mass. Beside
+it stand what closed forms say of the same legs, each with its best Lambert
+branch: the Lambert delta-v, MIMA and MIMA2; and the public network
+neural_lowthrust where it is installed.
+
+With --out, all is written as metrics.json and metrics.md, with plots of the
+ROC curves, of the reliability and of the margins; of several datasets one
+folder each, and evaluation.json and evaluation.md for all together.
 
   feasibility evaluate table1.seqmodel data/table1-test --out reports/table1
+  feasibility evaluate default data/search data/nea --out reports/default
 """
 
 
@@ -31,25 +41,53 @@ def add_parser(commands: Any) -> None:
     parser.add_argument(
         "--out", metavar="DIR", help="folder for tables and plots; of several datasets one in each"
     )
+    parser.add_argument(
+        "--alone", action="store_true", help="judge the model alone, without the others"
+    )
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Do what the command line asks for and return the exit code."""
+    """Do what the command line asks for and return the exit code.
+
+    Raises
+    ------
+    InputError
+        Input that cannot be used.
+    """
+    from feasibility.atomic import write_text
     from feasibility.classifier import FeasibilityClassifier
     from feasibility.dataset import read_dataset
-    from feasibility.learning.evaluate import evaluate
+    from feasibility.learning.evaluate import by_family, evaluate
+    from feasibility.learning.peers import known_peers
 
     classifier = FeasibilityClassifier.load(options.model)
     folders = [Path(dataset) for dataset in options.dataset]
-    for folder in folders:
-        evaluation = evaluate(classifier, read_dataset(folder))
+    names = [folder.resolve().name for folder in folders]
+    if len(set(names)) < len(names):
+        raise InputError(f"{' '.join(options.dataset)}: expected datasets of different names")
+    peers, missing = ([], None) if options.alone else known_peers()
+    model = Path(options.model).name
+    evaluations = {}
+    for folder, name in zip(folders, names, strict=True):
+        evaluation = evaluations[name] = evaluate(classifier, read_dataset(folder), peers)
         if len(folders) > 1:
-            print(f"## {folder.name}\n")
+            print(f"## {name}\n")
         print(evaluation.table())
         if options.out is not None:
             out = Path(options.out)
-            title = f"{Path(options.model).name} on {folder.name}"
-            for path in evaluation.write(out / folder.name if len(folders) > 1 else out, title):
+            target = out / name if len(folders) > 1 else out
+            for path in evaluation.write(target, f"{model} on {name}"):
                 print(f"wrote {path}")
+    if len(folders) > 1:
+        table = by_family(evaluations)
+        print(f"## all\n\n{table}")
+        if options.out is not None:
+            whole = {name: evaluation.to_dict() for name, evaluation in evaluations.items()}
+            write_text(Path(options.out) / "evaluation.json", json.dumps(whole, indent=1) + "\n")
+            parts = [f"## {name}\n\n{one.table()}" for name, one in evaluations.items()]
+            text = "\n".join([f"# {model}\n\n{table}", *parts])
+            write_text(Path(options.out) / "evaluation.md", text)
+    if missing is not None:
+        print(missing)
     return 0
