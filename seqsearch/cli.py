@@ -19,6 +19,7 @@ Sims-Flanagan model.
 
   seqsearch run demo                      a synthetic belt; needs no file
   seqsearch run gtoc7 --catalogue FILE    one GTOC7 probe on the official table
+  seqsearch resume runs/demo              go on after an interruption
   seqsearch verify runs/demo              check the result independently
 """
 
@@ -29,10 +30,20 @@ The folder gets config.toml (everything that was set), provenance.json (seed,
 versions), counters.csv (what was proposed, pruned, optimised and feasible at
 each rank), sequence.json (the tour with every impulse) and sequence.csv (its
 legs); tour.png shows it. It is rewritten after each rank: interrupt the run, or give a time
-limit, and the best tour so far is there.
+limit, and the best tour so far is there. `seqsearch resume` goes on with it:
+checkpoints/ has what that needs. audit.json says what pruning cost: how many of the
+flyable legs it dropped, found by optimising a few of the pruned ones.
 
 The same seed gives the same tour with any number of workers, unless a time
 limit cuts the search short.
+"""
+
+_RESUME: Final = """\
+Go on with a run that was interrupted, killed or stopped by a limit.
+
+The run goes on after the last rank that it finished. With the same limits it ends with
+the same tour as if it had never stopped. Limits count what earlier sessions used: a run
+that has used up its limit needs a larger one.
 """
 
 _FIGURES: Final = (".png", ".svg", ".pdf")
@@ -68,10 +79,7 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("--catalogue", metavar="FILE", help="asteroid table (GTOC2, 4, 5, 7, 11)")
     run.add_argument("--out", metavar="DIR", help="run folder (default: runs/PROBLEM)")
     run.add_argument("--seed", type=int, default=0, help="seed of the search (default: 0)")
-    run.add_argument(
-        "--time-limit", metavar="T", help="stop after 90s, 10min, 1h; passes go on until then"
-    )
-    run.add_argument("--workers", type=int, help="processes (default: one a core)")
+    _add_budget(run)
     run.add_argument("--beam-width", type=int, metavar="N", help="nodes kept at each rank")
     run.add_argument("--passes", type=int, metavar="N", help="beams run one after another")
     run.add_argument(
@@ -82,6 +90,18 @@ def _parser() -> argparse.ArgumentParser:
     )
     run.add_argument("--solver", choices=("fast", "reference"), help="leg solver")
     run.set_defaults(run=_run)
+
+    resume = commands.add_parser(
+        "resume", help="go on with a run", description=_RESUME, formatter_class=raw
+    )
+    resume.add_argument("path", metavar="RUN", help="run folder")
+    resume.add_argument(
+        "--from-rank",
+        metavar="PASS:RANK",
+        help="go on after this rank, such as 2:5, and drop what came later; 0:0 is the beginning",
+    )
+    _add_budget(resume)
+    resume.set_defaults(run=_resume)
 
     verify = commands.add_parser(
         "verify",
@@ -120,16 +140,35 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
+def _add_budget(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "--time-limit",
+        metavar="T",
+        help="stop after 90s, 10min, 1h in all; passes go on until then",
+    )
+    command.add_argument(
+        "--max-solves",
+        type=int,
+        metavar="N",
+        help="stop after so many full optimisations in all; passes go on until then",
+    )
+    command.add_argument("--workers", type=int, help="processes (default: one a core)")
+
+
 def _run(options: argparse.Namespace) -> int:
     from seqsearch.command_run import run_search
+    from seqsearch.session import Budget
 
     return run_search(
         options.problem,
         catalogue=options.catalogue,
         out=None if options.out is None else Path(options.out),
         seed=options.seed,
-        time_limit_s=None if options.time_limit is None else parse_duration(options.time_limit),
-        workers=options.workers,
+        budget=Budget(
+            time_limit_s=_seconds(options.time_limit),
+            max_solves=options.max_solves,
+            workers=options.workers,
+        ),
         overrides={
             "beam_width": options.beam_width,
             "passes": options.passes,
@@ -137,6 +176,22 @@ def _run(options: argparse.Namespace) -> int:
             "solver": options.solver,
         },
     )
+
+
+def _resume(options: argparse.Namespace) -> int:
+    from seqsearch.command_resume import parse_rank, resume_search
+
+    return resume_search(
+        Path(options.path),
+        after=None if options.from_rank is None else parse_rank(options.from_rank),
+        time_limit_s=_seconds(options.time_limit),
+        max_solves=options.max_solves,
+        workers=options.workers,
+    )
+
+
+def _seconds(duration: str | None) -> float | None:
+    return None if duration is None else parse_duration(duration)
 
 
 def _verify(options: argparse.Namespace) -> int:

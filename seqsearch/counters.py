@@ -57,6 +57,14 @@ class RankCounters:
     seconds_audit: float = 0.0
     seconds: float = 0.0
 
+    def barren_pruner(self) -> str | None:
+        """Return the pruner that dropped the last candidates; None if some survived."""
+        if not self.pruned or self.proposed > sum(self.pruned.values()):
+            return None
+        return (
+            [name for name, count in self.pruned.items() if count][-1] if self.proposed else None
+        )
+
     def count_pruned(self, pruned: dict[str, int]) -> None:
         """Add the counts of one batch."""
         for name, count in pruned.items():
