@@ -119,6 +119,13 @@ def test_probabilities_are_never_nan_and_the_unknown_is_kept(default, legs):
     for strange in (unbound, odd):
         assert not default.in_domain(strange).any()
         assert ClassifierPruner(default).keep(strange).all()
+        pruner = ClassifierPruner(default)
+        likely = default.feasible_probability(strange) >= pruner.threshold
+        np.testing.assert_array_equal(pruner.keep_with_unknown(strange)[1], ~likely)
+    # Among legs that are known none is kept for being unknown.
+    kept, unknown = pruner.keep_with_unknown(legs)
+    assert not (unknown & default.in_domain(legs)).any()
+    assert (~kept).any()
     assert default.in_domain(legs).mean() > 0.99
 
 

@@ -36,8 +36,7 @@ Fickle.keep: not row-wise: a leg gets another answer when the legs are reversed
 and goes wherever a pruner is asked for, also inside `AllOf`.
 
 Any scikit-learn model is one with ten lines. `margin_features` gives inputs that fit any
-spacecraft; add thrust over mass, which they leave out. An ONNX session is wrapped likewise,
-loaded in `__post_init__` from its file's bytes, as a session itself cannot be pickled.
+spacecraft; add thrust over mass, which they leave out.
 
 >>> from feasibility.learning.margin.features import log_acceleration, margin_features
 >>> @dataclass(frozen=True)
@@ -53,6 +52,21 @@ loaded in `__post_init__` from its file's bytes, as a session itself cannot be p
 ...         if known.any():
 ...             kept[known] = self.model.predict_proba(X[known])[:, 1] >= self.threshold
 ...         return kept
+
+An ONNX model takes the model's place there. Its session cannot be pickled, so the bytes of the
+file travel; and it has to answer for each leg alone, as single precision sums depend on the
+size of a batch.
+
+>>> class OnnxModel:
+...     def __init__(self, content):  # bytes of a classifier's .onnx file
+...         from onnxruntime import InferenceSession
+...         self.content, self.session = content, InferenceSession(content)
+...     def __reduce__(self):
+...         return OnnxModel, (self.content,)
+...     def predict_proba(self, X):
+...         name = self.session.get_inputs()[0].name
+...         rows = X.astype(np.float32)[:, None]
+...         return np.concatenate([self.session.run(None, {name: x})[-1] for x in rows])
 """
 
 from feasibility.pruners.all_of import AllOf, pruner_name
