@@ -9,7 +9,7 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility import AllOf, Pruner
+from feasibility import AllOf, InputError, Pruner
 from feasibility.orbits import OrbitalNeighbours
 from feasibility.pruners.predictor import LegPredictor
 from seqsearch.audit import RankSample
@@ -20,8 +20,11 @@ from seqsearch.expansion import Candidates, reached
 from seqsearch.frontier import Frontier, make_frontier
 from seqsearch.nodes import Nodes
 from seqsearch.optimisation import LegOptimiser, Optimised, SolvedHops
+from seqsearch.own_moves import OwnMoves
+from seqsearch.own_moves_expander import OwnMovesExpander
+from seqsearch.pacing import Pacer, rebalanced
 from seqsearch.pruner_spec import parse_pruner, predictor_of
-from seqsearch.ranking import Ranking
+from seqsearch.ranking import Ranking, TimePropellantRanking
 from seqsearch.rankings import make_ranking
 from seqsearch.settings import SearchSettings
 from seqsearch.starts import dense_starts
@@ -181,13 +184,11 @@ class _Search:
         self._neighbours = OrbitalNeighbours(
             problem.catalogue, reference_tof_days=settings.reference_tof_days
         )
-        self._ranking = ranking or make_ranking(settings, predictor, self._neighbours)
-        means = (problem, self._neighbours, self._pruner, self._ranking, optimiser)
-        self._expander: Expander = (
-            GridExpander(*means)
-            if predictor is None
-            else ForecastExpander(*means, predictor, threads)
-        )
+        self._given_ranking = ranking
+        self._threads = threads
+        self._pacer = None if deadline.remaining_s() is None else Pacer(problem, deadline)
+        # Passes may rank differently; which of two tours is better must not depend on it.
+        self._judge = TimePropellantRanking(settings.time_weight, settings.propellant_weight)
         self._spent_before = state.spent_s
         self._began = time.monotonic()
 
@@ -201,6 +202,8 @@ class _Search:
                 endless or state.pass_number < self._settings.passes
             ) and not self._out_of_budget():
                 state.pass_number += 1
+                if self._pacer is not None:
+                    self._pacer.begin_pass(state.pass_number)
                 self._run_pass(self._start_nodes())
         except KeyboardInterrupt:
             stopped = "interrupted"
@@ -210,18 +213,46 @@ class _Search:
             stopped = "solve limit"
         return SearchResult(self._best_tour(), state.tree, state.counters, stopped)
 
+    def _make_ranking(self) -> Ranking:
+        return self._given_ranking or make_ranking(
+            self._state.settings, self._predictor, self._neighbours
+        )
+
+    def _make_expander(self, ranking: Ranking) -> Expander:
+        problem = self._problem
+        means = (problem, self._neighbours, self._pruner, ranking, self._optimiser)
+        if isinstance(problem, OwnMoves):
+            if self._predictor is None:
+                raise InputError(
+                    f"problem {problem.name}: its moves need a trained model, such as the pruner "
+                    "default:0.99"
+                )
+            return OwnMovesExpander(
+                problem, problem, self._predictor, self._pruner, ranking, self._optimiser
+            )
+        if self._predictor is None:
+            return GridExpander(*means)
+        return ForecastExpander(*means, self._predictor, self._threads)
+
     def _run_pass(self, nodes: Nodes) -> None:
         """Run a pass from its starts, or go on with one."""
         state = self._state
-        frontier = make_frontier(state.settings, self._problem, self._ranking)
+        ranking = self._make_ranking()
+        expander = self._make_expander(ranking)
+        frontier = make_frontier(state.settings, self._problem, ranking)
         frontier.push(nodes)
         while len(nodes := frontier.pop()) and not self._out_of_budget():
+            if self._pacer is not None:
+                width = self._pacer.width(nodes, state.settings, state.counters)
+                state.settings = state.settings.with_(beam_width=width)
+                frontier = _remade(frontier, state.settings, self._problem, ranking)
+                nodes = nodes.take(np.arange(min(len(nodes), width)))
             counters = RankCounters(
                 pass_number=state.pass_number, rank=int(nodes.depth.max()) + 1, nodes=len(nodes)
             )
             start = time.perf_counter()
             sample = self._sample()
-            expanded = self._expander.expand(
+            expanded = expander.expand(
                 nodes, frontier, self._affordable(), counters, sample, self._deadline
             )
             found = None
@@ -238,6 +269,8 @@ class _Search:
             counters.cut = self._out_of_budget()
             counters.seconds = time.perf_counter() - start
             state.counters.append(counters)
+            if not counters.cut and frontier.waiting() is None:
+                state.settings = rebalanced(state.settings, nodes, self._problem)
             self._report(frontier)
         state.waiting = None
 
@@ -263,8 +296,11 @@ class _Search:
 
     def _start_nodes(self) -> Nodes:
         state = self._state
-        rows, epochs = dense_starts(self._problem, self._neighbours, state.settings, self._rng)
-        nodes = self._problem.start_nodes(rows, epochs)
+        if isinstance(self._problem, OwnMoves):
+            nodes = self._problem.starts(state.settings, self._rng)
+        else:
+            rows, epochs = dense_starts(self._problem, self._neighbours, state.settings, self._rng)
+            nodes = self._problem.start_nodes(rows, epochs)
         ids = [
             state.tree.add_start(int(row), float(t), float(mass))
             for row, t, mass in zip(nodes.row, nodes.t_first_mjd2000, nodes.mass, strict=True)
@@ -313,7 +349,8 @@ class _Search:
             for parent, chain in zip(found.nodes.parent_id[chosen], chains, strict=True)
         ]
         kept = replace(found.nodes.take(chosen), tree_id=np.asarray(ids, dtype=np.int64))
-        frontier.push(kept)
+        if len(kept):
+            frontier.push(kept)
         counters.kept = len(kept)
         self._note_best(kept)
 
@@ -322,7 +359,7 @@ class _Search:
         if len(nodes) == 0:
             return
         deepest = nodes.take(nodes.depth == nodes.depth.max())
-        scores = self._ranking.score(deepest, self._problem)
+        scores = self._judge.score(deepest, self._problem)
         best = int(np.argmin(scores))
         key = (int(deepest.depth[0]), -float(scores[best]))
         if key > self._state.best_key:
@@ -331,6 +368,17 @@ class _Search:
 
     def _best_tour(self) -> Tour:
         return Tour.from_tree(self._problem, self._state.tree, self._state.best_node)
+
+
+def _remade(
+    frontier: Frontier, settings: SearchSettings, problem: TourProblem, ranking: Ranking
+) -> Frontier:
+    """Return the frontier as it is, with other settings."""
+    waiting = frontier.waiting()
+    remade = make_frontier(settings, problem, ranking)
+    if waiting is not None:
+        remade.push(waiting)
+    return remade
 
 
 @final

@@ -12,8 +12,11 @@ from msgspec import Meta
 from feasibility import InputError, Spacecraft
 from feasibility.constants import mjd_to_mjd2000
 from feasibility.orbits import Catalogue, read_catalogue, synthetic_main_belt
+from seqsearch.gtoc5.problem import Gtoc5Problem
+from seqsearch.gtoc5.rules import Gtoc5Rules
 from seqsearch.problem import Problem
 from seqsearch.settings import SearchSettings
+from seqsearch.tour_problem import TourProblem
 
 
 class _Table(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -65,6 +68,7 @@ class Config(_Table, frozen=True, kw_only=True):
     spacecraft: SpacecraftTable
     mission: MissionTable
     catalogue: CatalogueTable = msgspec.field(default_factory=CatalogueTable)
+    gtoc5: Gtoc5Rules | None = None
     search: SearchSettings = msgspec.field(default_factory=SearchSettings)
 
 
@@ -84,7 +88,7 @@ def read_config(problem: str) -> Config:
     Parameters
     ----------
     problem : str
-        Name of a built-in problem (``gtoc7``, ``demo``) or path of a TOML file.
+        Name of a built-in problem (``gtoc5``, ``gtoc7``, ``demo``) or path of a TOML file.
 
     Raises
     ------
@@ -157,8 +161,10 @@ def with_catalogue(config: Config, file: str) -> Config:
     return msgspec.structs.replace(config, catalogue=CatalogueTable(file=file))
 
 
-def build_problem(config: Config) -> Problem:
+def build_problem(config: Config) -> TourProblem:
     """Load the catalogue and build the validated problem.
+
+    A tour of rendezvous; with a table ``[gtoc5]``, a tour by its rules.
 
     Raises
     ------
@@ -168,7 +174,7 @@ def build_problem(config: Config) -> Problem:
     craft = config.spacecraft
     mission = config.mission
     earliest, latest = mission.first_departure_mjd
-    return Problem(
+    problem = Problem(
         name=config.problem.name,
         catalogue=_load_catalogue(config),
         spacecraft=Spacecraft(craft.dry_mass_kg, craft.thrust_n, craft.isp_s),
@@ -178,15 +184,16 @@ def build_problem(config: Config) -> Problem:
         min_stay_days=mission.min_stay_days,
         start_ids=mission.start_ids,
     )
+    return problem if config.gtoc5 is None else Gtoc5Problem(base=problem, rules=config.gtoc5)
 
 
-def load_problem(problem: str, catalogue: str | Path | None = None) -> Problem:
+def load_problem(problem: str, catalogue: str | Path | None = None) -> TourProblem:
     """Return a problem by name or from a TOML file, with its catalogue.
 
     Parameters
     ----------
     problem : str
-        Name of a built-in problem (``gtoc7``, ``demo``) or path of a TOML file.
+        Name of a built-in problem (``gtoc5``, ``gtoc7``, ``demo``) or path of a TOML file.
     catalogue : str or Path, optional
         Asteroid table to use instead of the one that the problem names.
 
@@ -223,5 +230,6 @@ def to_toml(config: Config) -> str:
     plain = {
         name: {key: value for key, value in table.items() if value is not None}
         for name, table in tables.items()
+        if table is not None
     }
     return tomli_w.dumps(plain)

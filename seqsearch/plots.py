@@ -46,11 +46,11 @@ def plot_tour(tour: Tour, path: Path) -> None:
 
 
 def _draw_path(axes: "Axes", tour: Tour) -> None:
-    for k, leg in enumerate(tour.legs):
-        track = _track(tour, k, leg) / AU
+    for leg in tour.legs:
+        track = _track(tour, leg) / AU
         axes.plot(track[:, 0], track[:, 1], linewidth=1.2)
     stops = [tour.legs[0].t_dep_mjd2000] if tour.legs else [tour.t_start_mjd2000]
-    stops += [leg.t_arr_mjd2000 for leg in tour.legs]
+    stops += [leg.t_arr_mjd2000 for leg in tour.legs if not leg.is_fly_by]
     for k, (body, epoch) in enumerate(zip(tour.bodies, stops, strict=True)):
         x, y = body_state(body, epoch, tour.rules.mu_m3_s2)[:2] / AU
         axes.plot(x, y, "ko", markersize=3)
@@ -78,12 +78,13 @@ def _draw_throttle(axes: "Axes", tour: Tour) -> None:
     axes.set(xlabel="MJD", ylabel="throttle", ylim=(0, 1.05))
 
 
-def _track(tour: Tour, k: int, leg: TourLeg) -> NDArray[np.float64]:
+def _track(tour: Tour, leg: TourLeg) -> NDArray[np.float64]:
     """Return (p, 3) points in m along a leg, on the Kepler arcs between its impulses."""
     from feasibility.orbits.kepler_kernels import propagate_batch
 
     mu = tour.rules.mu_m3_s2
-    state = body_state(tour.bodies[k], leg.t_dep_mjd2000, mu)
+    state = body_state(tour.body(leg.from_id), leg.t_dep_mjd2000, mu)
+    state[3:] += leg.dep_velocity_m_s
     epochs = [leg.t_dep_mjd2000, *(i.t_mjd2000 for i in leg.impulses), leg.t_arr_mjd2000]
     impulses = [*(np.asarray(impulse.dv_m_s) for impulse in leg.impulses), np.zeros(3)]
     points = []

@@ -153,5 +153,5 @@ def _rank_line(counters: RankCounters, tour: Tour) -> str:
         f"pass {counters.pass_number} rank {counters.rank:>2}: {counters.nodes} nodes, "
         f"{counters.proposed} proposed, pruned {pruned or 'none'}, "
         f"{counters.optimised} optimised, {counters.feasible} feasible, {counters.kept} kept, "
-        f"{counters.seconds:.1f} s | best {tour.n_asteroids} asteroids"
+        f"{counters.seconds:.1f} s | best {tour.headline()}"
     )

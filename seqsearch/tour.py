@@ -5,14 +5,21 @@ from typing import Final, Self, final
 
 import msgspec
 import numpy as np
+from numpy.typing import NDArray
 
 from feasibility import InputError
 from feasibility.constants import DAY_S, G0, MJD2000_MJD, MU_SUN
+from seqsearch.gtoc5.problem import Gtoc5Problem
+from seqsearch.gtoc5.rules import Gtoc5Rules
+from seqsearch.own_moves import OwnMoves
 from seqsearch.tour_problem import TourProblem
 from seqsearch.tree import FlownLeg, SearchTree
 
 FORMAT: Final = "seqsearch-tour-1"
 """Name and version of the layout of ``sequence.json``."""
+
+_REST_M_S: Final = 1e-6
+"""Relative speed below which a spacecraft is at rest at a body."""
 
 
 class _Record(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -32,7 +39,16 @@ class Impulse(_Record, frozen=True, kw_only=True):
 
 @final
 class TourLeg(_Record, frozen=True, kw_only=True):
-    """One leg: from departure at a body to arrival at the next."""
+    """One leg: from departure at a body to arrival at the next.
+
+    Attributes
+    ----------
+    dep_velocity_m_s, arr_velocity_m_s : tuple of float
+        Velocities at departure and arrival, relative to the bodies: zero at
+        rest, otherwise that of a launch or of a fly-by.
+    dropped_kg : float
+        What is left behind at the arrival.
+    """
 
     from_id: int
     to_id: int
@@ -42,6 +58,14 @@ class TourLeg(_Record, frozen=True, kw_only=True):
     m_final_kg: float
     m_star_kg: float
     impulses: tuple[Impulse, ...]
+    dep_velocity_m_s: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    arr_velocity_m_s: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    dropped_kg: float = 0.0
+
+    @property
+    def is_fly_by(self) -> bool:
+        """Whether the leg passes its target, rather than ending at rest there."""
+        return any(self.arr_velocity_m_s)
 
     @property
     def t_arr_mjd2000(self) -> float:
@@ -83,6 +107,7 @@ class TourRules(_Record, frozen=True, kw_only=True):
     max_duration_days: float
     min_stay_days: float
     start_ids: tuple[int, ...]
+    gtoc5: Gtoc5Rules | None = None
     mu_m3_s2: float = MU_SUN
     g0_m_s2: float = G0
 
@@ -100,9 +125,9 @@ class Tour(_Record, frozen=True, kw_only=True):
     t_start_mjd2000 : float
         Epoch of the first departure (of the start, if there is no leg).
     bodies : tuple of TourBody
-        The visited bodies in order, the start body first.
+        The bodies in order of rendezvous, the start body first.
     legs : tuple of TourLeg
-        One fewer than the bodies.
+        One fewer than the bodies, and those that end with a fly-by.
     """
 
     format: str = FORMAT
@@ -113,8 +138,40 @@ class Tour(_Record, frozen=True, kw_only=True):
 
     @property
     def n_asteroids(self) -> int:
-        """Number of visited bodies, the start included."""
-        return len(self.bodies)
+        """Number of visited bodies; the start counts unless it is the Earth of GTOC5."""
+        return len(self.bodies) - (self.rules.gtoc5 is not None)
+
+    @property
+    def score(self) -> float:
+        """What the problem counts: visited bodies, or the score of GTOC5."""
+        rules = self.rules.gtoc5
+        if rules is None:
+            return float(self.n_asteroids)
+        score = 0.0
+        met: set[int] = set()
+        passed: set[int] = set()
+        for leg in self.legs:
+            weight = rules.bonus_factor if leg.to_id in rules.bonus_ids else 1.0
+            if not leg.is_fly_by and leg.to_id not in met:
+                met.add(leg.to_id)
+                score += weight * rules.rendezvous_score
+            elif leg.is_fly_by and leg.to_id in met - passed:
+                passed.add(leg.to_id)
+                score += weight * rules.fly_by_score
+        return score
+
+    def body(self, body_id: int) -> TourBody:
+        """Return the body with an id.
+
+        Raises
+        ------
+        InputError
+            There is none.
+        """
+        for body in self.bodies:
+            if body.id == body_id:
+                return body
+        raise InputError(f"tour: a leg names body {body_id}, which is not among the bodies")
 
     @property
     def duration_days(self) -> float:
@@ -123,15 +180,20 @@ class Tour(_Record, frozen=True, kw_only=True):
 
     @property
     def m_final_kg(self) -> float:
-        """Mass after the last arrival."""
-        return self.legs[-1].m_final_kg if self.legs else self.rules.m0_kg
+        """Mass after the last arrival, without what was left there."""
+        if not self.legs:
+            return self.rules.m0_kg
+        return self.legs[-1].m_final_kg - self.legs[-1].dropped_kg
 
     @classmethod
     def from_tree(cls, problem: TourProblem, tree: SearchTree, node: int) -> Self:
-        """Build the tour that leads to a node of the search tree."""
+        """Build the tour that leads to a node of the search tree, with what completes it."""
         flown = tree.legs_to(node)
         last = tree.node(node)
-        rows = [leg.dep_row for leg in flown] + [int(last["row"])]
+        rows = [flown[0].dep_row if flown else int(last["row"])]
+        rows += [leg.arr_row for leg in flown if leg.arr_row != leg.dep_row]
+        if isinstance(problem, OwnMoves):
+            flown += problem.closing(int(last["row"]), last["t_mjd2000"], last["mass"])
         t_start = flown[0].t_dep_mjd2000 if flown else float(last["t_mjd2000"])
         return cls(
             rules=_rules(problem),
@@ -152,20 +214,25 @@ class Tour(_Record, frozen=True, kw_only=True):
         )
         lines = [header, "-" * len(header)]
         lines += [
-            f"{k:>3}  {leg.from_id:>7}  {leg.to_id:>7}  {body.name[:18]:<18}  "
+            f"{k:>3}  {leg.from_id:>7}  {leg.to_id:>7}  {self.body(leg.to_id).name[:18]:<18}  "
             f"{leg.t_dep_mjd2000 + MJD2000_MJD:>12.3f}  {leg.t_arr_mjd2000 + MJD2000_MJD:>12.3f}  "
             f"{leg.tof_days:>7.2f}  {leg.m0_kg:>8.2f}  {leg.m_final_kg:>8.2f}  {leg.margin:>6.3f}"
-            for k, (leg, body) in enumerate(zip(self.legs, self.bodies[1:], strict=True), 1)
+            for k, leg in enumerate(self.legs, 1)
         ]
         return "\n".join(lines)
 
     def summary(self) -> str:
-        """Return one line: visits, duration, mass."""
+        """Return one line: what counts, duration, mass."""
         return (
-            f"{self.n_asteroids} asteroids, {len(self.legs)} legs, "
+            f"{self.headline()}, {len(self.legs)} legs, "
             f"{self.duration_days:.1f} of {self.rules.max_duration_days:.1f} days, "
             f"final mass {self.m_final_kg:.1f} kg (dry {self.rules.m_dry_kg:.1f} kg)"
         )
+
+    def headline(self) -> str:
+        """Return what counts in a few words."""
+        visits = f"{self.n_asteroids} asteroids"
+        return visits if self.rules.gtoc5 is None else f"score {self.score:.1f}, {visits}"
 
 
 def read_tour(path: Path) -> Tour:
@@ -198,17 +265,22 @@ def to_csv(tour: Tour) -> str:
     """Return the legs as CSV, epochs in MJD, one row a leg."""
     lines = [
         "leg,from_id,from_name,to_id,to_name,t_dep_mjd,t_arr_mjd,tof_days,stay_before_days,"
-        "m0_kg,m_final_kg,m_star_kg,margin"
+        "m0_kg,m_final_kg,m_star_kg,margin,dropped_kg,dep_speed_m_s,arr_speed_m_s"
     ]
     previous: TourLeg | None = None
     for k, leg in enumerate(tour.legs):
         stay = "" if previous is None else f"{leg.t_dep_mjd2000 - previous.t_arr_mjd2000:.6f}"
-        names = [body.name.replace(",", " ").replace('"', "'") for body in tour.bodies[k : k + 2]]
+        names = [
+            tour.body(body_id).name.replace(",", " ").replace('"', "'")
+            for body_id in (leg.from_id, leg.to_id)
+        ]
         lines.append(
             f"{k + 1},{leg.from_id},{names[0]},{leg.to_id},{names[1]},"
             f"{leg.t_dep_mjd2000 + MJD2000_MJD:.6f},{leg.t_arr_mjd2000 + MJD2000_MJD:.6f},"
             f"{leg.tof_days:.6f},{stay},{leg.m0_kg:.6f},{leg.m_final_kg:.6f},"
-            f"{leg.m_star_kg:.6f},{leg.margin:.6f}"
+            f"{leg.m_star_kg:.6f},{leg.margin:.6f},{leg.dropped_kg:.6f},"
+            f"{np.linalg.norm(leg.dep_velocity_m_s):.6f},"
+            f"{np.linalg.norm(leg.arr_velocity_m_s):.6f}"
         )
         previous = leg
     return "\n".join(lines) + "\n"
@@ -227,6 +299,7 @@ def _rules(problem: TourProblem) -> TourRules:
         max_duration_days=problem.max_duration_days,
         min_stay_days=problem.min_stay_days,
         start_ids=problem.start_ids,
+        gtoc5=problem.rules if isinstance(problem, Gtoc5Problem) else None,
     )
 
 
@@ -256,7 +329,20 @@ def _leg(problem: TourProblem, leg: FlownLeg) -> TourLeg:
         m_final_kg=leg.m_final,
         m_star_kg=leg.m_star,
         impulses=_impulses(problem, leg),
+        dep_velocity_m_s=_relative(problem, leg.dep_row, leg.t_dep_mjd2000, leg.rv_dep),
+        arr_velocity_m_s=_relative(problem, leg.arr_row, leg.t_arr_mjd2000, leg.rv_arr),
+        dropped_kg=leg.dropped,
     )
+
+
+def _relative(
+    problem: TourProblem, row: int, t_mjd2000: float, rv: NDArray[np.float64]
+) -> tuple[float, float, float]:
+    """Return the velocity relative to a body, in m/s; exactly zero at rest."""
+    velocity = rv[3:] - problem.catalogue.states_at([row], t_mjd2000)[0, 3:]
+    if np.linalg.norm(velocity) < _REST_M_S:
+        return (0.0, 0.0, 0.0)
+    return (float(velocity[0]), float(velocity[1]), float(velocity[2]))
 
 
 def _impulses(problem: TourProblem, leg: FlownLeg) -> tuple[Impulse, ...]:

@@ -1,0 +1,41 @@
+"""`Visits`: predicted ways to next visits, one row a way."""
+
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+from numpy.typing import NDArray
+
+_Array = NDArray[np.float64]
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Visits:
+    """Ways from a node to next rendezvous.
+
+    With n the number of ways.
+
+    Attributes
+    ----------
+    target : (n,) intp
+        Catalogue row of the body.
+    fly_by_days : (n,) float64
+        Time of the self-fly-by before the transfer; 0 at the launch.
+    velocity : (n, 3) float64, m/s
+        At the departure of the transfer, relative to the body that is left:
+        that of the launch or of the fly-by.
+    tof_days : (n,) float64
+        Time of the transfer.
+    log_margin : (n,) float64
+        Predicted log(m*/m0) of the transfer.
+    """
+
+    target: NDArray[np.intp]
+    fly_by_days: _Array
+    velocity: _Array
+    tof_days: _Array
+    log_margin: _Array
+
+    def __len__(self) -> int:
+        return len(self.target)

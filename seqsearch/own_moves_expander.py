@@ -1,0 +1,101 @@
+"""`OwnMovesExpander`: optimises what a problem with moves of its own proposes."""
+
+import time
+from typing import Final, final
+
+import numpy as np
+
+from feasibility import AllOf
+from feasibility.pruners.predictor import LegPredictor
+from seqsearch.audit import RankSample
+from seqsearch.counters import RankCounters
+from seqsearch.deadline import Deadline
+from seqsearch.expanders import Expanded, keep_hops
+from seqsearch.expansion import Candidates, reached
+from seqsearch.frontier import Frontier
+from seqsearch.nodes import Nodes
+from seqsearch.optimisation import LegOptimiser
+from seqsearch.own_moves import OwnMoves
+from seqsearch.ranking import Ranking
+from seqsearch.settings import SearchSettings
+from seqsearch.tour_problem import TourProblem
+
+_SOLVED: Final = 1.5
+"""Hops that are optimised, for each node that can go on."""
+
+
+@final
+class OwnMovesExpander:
+    """Optimises the proposals of a problem that seem to go on; an `Expander`.
+
+    Parameters
+    ----------
+    problem : TourProblem
+        For the nodes that are reached.
+    moves : OwnMoves
+        The same problem, as it proposes.
+    predictor : LegPredictor
+        Whom the problem may ask.
+    pruner : AllOf
+        What survives of the proposals.
+    ranking : Ranking
+        What is optimised first.
+    optimiser : LegOptimiser
+        How it is optimised.
+    """
+
+    def __init__(
+        self,
+        problem: TourProblem,
+        moves: OwnMoves,
+        predictor: LegPredictor,
+        pruner: AllOf,
+        ranking: Ranking,
+        optimiser: LegOptimiser,
+    ) -> None:
+        self._problem = problem
+        self._moves = moves
+        self._predictor = predictor
+        self._pruner = pruner
+        self._ranking = ranking
+        self._optimiser = optimiser
+
+    def expand(
+        self,
+        nodes: Nodes,
+        frontier: Frontier,
+        settings: SearchSettings,
+        counters: RankCounters,
+        sample: RankSample | None,
+        deadline: Deadline,
+    ) -> Expanded | None:
+        """Return the hops found; None where nothing was worth optimising."""
+        clock = time.perf_counter()
+        candidates, found = [], []
+        for proposal in self._moves.moves(nodes, settings, self._predictor):
+            counters.proposed += len(proposal.candidates)
+            counters.questions += proposal.questions
+            candidates.append(proposal.candidates)
+            found.append(reached(self._problem, nodes, proposal.candidates, proposal.m_final))
+            if deadline.passed():
+                return None
+        counters.seconds_expand += time.perf_counter() - clock
+        if not candidates:
+            return None
+        clock = time.perf_counter()
+        reachable = Nodes.concatenate(found)
+        chosen = frontier.admit(reachable, _SOLVED)
+        best = Candidates.concatenate(candidates).take(chosen)
+        counters.count_pruned({"predictor": len(reachable) - len(chosen)})
+        mask = keep_hops(self._pruner, best.hops, counters)
+        if sample is not None:
+            sample.offer(best, mask)
+        best, reachable = best.take(mask), reachable.take(chosen).take(mask)
+        counters.seconds_prune += time.perf_counter() - clock
+        if len(best) == 0 or deadline.passed():
+            return None
+        clock = time.perf_counter()
+        order = np.argsort(self._ranking.score(reachable, self._problem), kind="stable")
+        optimised = self._optimiser.run_all(best, order, settings, deadline)
+        counters.seconds_optimise = time.perf_counter() - clock
+        return Expanded(best, optimised)
