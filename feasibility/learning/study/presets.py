@@ -175,12 +175,12 @@ _LAPTOP: Final = Preset(
     ratios=(1.0, 2.0, 5.0),
     imbalance_seeds=2,
     tuning_model="dnn",
-    tuning_rows=10_000,
+    tuning_rows=5000,
     tuning_trials=30,
     tuning_epochs=10,
     tuning_workers=2,
     ranking_seeds=5,
-    label_legs=200,
+    label_legs=120,
     label_models=("ensemble", "tree"),
 )
 
