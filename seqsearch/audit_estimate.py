@@ -10,12 +10,18 @@ The numbers seen are sums of rare, negatively correlated draws and scatter no
 more than Poisson variables, so intervals for weighted Poisson sums hold. The
 interval used matches a gamma distribution to the sum and its variance, the
 upper limit after adding one more of the heaviest weight (Fay and Feuer 1997,
-Statistics in Medicine 16:791): a stratum of millions in which nothing was found
-still raises the limit. The ratio of the pruned to all flyable candidates follows
+Statistics in Medicine 16:791). The ratio of the pruned to all flyable candidates follows
 by melding the confidence distributions of both sums (Fay, Proschan and
 Brittain 2015, Biometrics 71:146), here in closed form as the ratio of gamma
 variables is a beta variable. With one weight throughout the result is the
 Clopper-Pearson interval.
+
+A far stratum, of candidates that are hopeless unless the predictor is wrong by
+more than a tenth, holds so many that its weight alone would set the upper limit,
+whatever is found near the boundary. It is a tripwire: sampled as the others,
+and as soon as one flyable candidate is found there, it counts in full. Until then it is left out
+of `interval`, which thus trusts the predictor that far; `interval_no_trust` never
+leaves it out.
 """
 
 from collections.abc import Iterable
@@ -45,8 +51,9 @@ class Stratum:
     flyable : int
         How many of those can be flown.
     contenders : int
-        How many of the flyable ones lead to a node better than the worst that
-        the beam kept.
+        How many of the flyable ones would have gone on in the beam.
+    far : bool
+        The predictor thinks these far from flyable.
     """
 
     label: str
@@ -54,6 +61,7 @@ class Stratum:
     solved: int
     flyable: int
     contenders: int = 0
+    far: bool = False
 
     @property
     def weight(self) -> float:
@@ -92,10 +100,14 @@ class AuditEstimate:
         Share of the flyable candidates that were pruned; NaN where no flyable
         candidate was seen.
     interval : tuple of float
-        Its confidence interval.
+        Its confidence interval, if nothing is flyable in far strata where nothing
+        was found.
+    interval_no_trust : tuple of float
+        Its confidence interval without that condition.
+    far_solved, far_found : int
+        Candidates of far strata that were optimised, and flyable ones among them.
     contenders : float
-        Estimate of the falsely pruned candidates that lead to a node better
-        than the worst that the beam kept.
+        Estimate of the falsely pruned candidates that would have gone on in the beam.
     contenders_found : int
         How many of those were seen.
     """
@@ -107,6 +119,9 @@ class AuditEstimate:
     flyable_kept: float
     false_prune_rate: float
     interval: tuple[float, float]
+    interval_no_trust: tuple[float, float]
+    far_solved: int
+    far_found: int
     contenders: float
     contenders_found: int
 
@@ -116,6 +131,8 @@ class AuditEstimate:
         audits = list(audits)
         pruned = [stratum for audit in audits for stratum in audit.pruned]
         kept = [stratum for audit in audits for stratum in audit.kept]
+        far = [stratum for stratum in pruned if stratum.far]
+        far_found = sum(stratum.flyable for stratum in far)
         lost, held = _WeightedSum.of(pruned), _WeightedSum.of(kept)
         total = lost.sum + held.sum
         return cls(
@@ -125,7 +142,10 @@ class AuditEstimate:
             flyable_pruned=lost.sum,
             flyable_kept=held.sum,
             false_prune_rate=lost.sum / total if total else float("nan"),
-            interval=share_interval(pruned, kept),
+            interval=share_interval([s for s in pruned if not s.far or far_found], kept),
+            interval_no_trust=share_interval(pruned, kept),
+            far_solved=sum(stratum.solved for stratum in far),
+            far_found=far_found,
             contenders=sum(stratum.weight * stratum.contenders for stratum in pruned),
             contenders_found=sum(stratum.contenders for stratum in pruned),
         )
@@ -134,13 +154,16 @@ class AuditEstimate:
         """Return the estimate as a sentence."""
         if not self.solved_pruned:
             return "audit: nothing was pruned"
+        if not self.found and not self.flyable_kept:
+            return f"audit: none of {self.solved_pruned} pruned legs tried can be flown"
         low, high = (100 * limit for limit in self.interval)
-        rate = f"{100 * self.false_prune_rate:.2f} %" if self.flyable_pruned else "0 %"
+        near = self.solved_pruned - self.far_solved
+        far = f", {self.far_found} of {self.far_solved} far from it" if self.far_solved else ""
         return (
-            f"audit: {rate} of the flyable legs were pruned "
-            f"({100 * CONFIDENCE:g} % interval {low:.2f} to {high:.2f} %; "
-            f"{self.found} of {self.solved_pruned} pruned legs tried can be flown), "
-            f"about {self.contenders:.0f} of them fit for the beam"
+            f"audit: {100 * self.false_prune_rate:.2f} % of the flyable legs were pruned "
+            f"({100 * CONFIDENCE:g} % interval {low:.2f} to {high:.2f} %), about "
+            f"{self.contenders:.0f} of them fit for the beam; of pruned legs tried, "
+            f"{self.found - self.far_found} of {near} near the boundary can be flown{far}"
         )
 
 

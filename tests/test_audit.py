@@ -1,7 +1,7 @@
 """The audit: its estimates against brute force, its samples, and that it changes no search."""
 
 import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -47,6 +47,20 @@ def test_more_solves_tighten_the_interval_and_hopeless_millions_widen_it():
     assert few[0] == many[0] == none[0] > 0
 
 
+def test_a_far_stratum_is_a_tripwire():
+    near, kept = _stratum(1000, 50, 5), _stratum(30_000, 100, 80)
+    quiet = replace(_stratum(1e6, 100, 0), far=True)
+    without = AuditEstimate.of([RankAudit(pruned=(near,), kept=(kept,))])
+    calm = AuditEstimate.of([RankAudit(pruned=(near, quiet), kept=(kept,))])
+    assert calm.interval == without.interval
+    assert calm.interval_no_trust[1] > 2 * calm.interval[1]
+    tripped = replace(quiet, flyable=1)
+    alarm = AuditEstimate.of([RankAudit(pruned=(near, tripped), kept=(kept,))])
+    assert alarm.interval == alarm.interval_no_trust
+    assert alarm.false_prune_rate > 10 * calm.false_prune_rate
+    assert alarm.far_found == 1
+
+
 def test_nothing_pruned_and_nothing_flyable():
     nothing = AuditEstimate.of([RankAudit(pruned=(), kept=(_stratum(100, 50, 40),))])
     assert nothing.false_prune_rate == 0
@@ -54,7 +68,7 @@ def test_nothing_pruned_and_nothing_flyable():
     hopeless = AuditEstimate.of([RankAudit(pruned=(_stratum(100, 50, 0),), kept=())])
     assert np.isnan(hopeless.false_prune_rate)
     assert hopeless.interval == (0.0, 1.0)
-    assert "0 of 50" in hopeless.one_line()
+    assert "none of 50" in hopeless.one_line()
 
 
 @settings(max_examples=12)
@@ -156,17 +170,16 @@ def test_strata_follow_the_predicted_margin():
     tof = np.concatenate([_tofs(1000), np.full(3000, 20.0)])
     audit = _solve([_candidates(tof)], solves=120, predictor=_ByTof())
     strata = {stratum.label: stratum for stratum in audit.pruned}
-    assert set(strata) == {"below 0.7", "0.7 to 0.9", "0.9 to 1", "unknown"}
     counts = {
-        "below 0.7": ((tof >= 10) & (tof < 70)).sum(),
-        "0.7 to 0.9": ((tof >= 70) & (tof < 90)).sum(),
-        "0.9 to 1": ((tof >= 90) & (tof < 97)).sum(),
+        "below 0.9": ((tof >= 10) & (tof < 90)).sum(),
+        "0.9 to 0.97": ((tof >= 90) & (tof < 97)).sum(),
         "unknown": (tof < 10).sum(),
     }
     assert {label: s.candidates for label, s in strata.items()} == counts
     assert sum(s.solved for s in audit.pruned) == 120
-    assert [s.label for s in audit.pruned if s.flyable] == ["0.9 to 1"]
-    near = strata["0.9 to 1"]
+    assert [s.label for s in audit.pruned if s.flyable] == ["0.9 to 0.97"]
+    assert [s.label for s in audit.pruned if s.far] == ["below 0.9"]
+    near = strata["0.9 to 0.97"]
     assert 0 < near.contenders < near.flyable
     assert audit.kept[0].solved == audit.kept[0].flyable == 60
 
