@@ -17,7 +17,7 @@ from scipy.optimize import newton
 from scipy.spatial.transform import Rotation
 
 from feasibility.constants import AU, DAY_S
-from feasibility.orbits import Catalogue
+from feasibility.orbits import Catalogue, earth
 from seqsearch.tour import Tour, TourBody, TourLeg, TourRules
 
 POSITION_TOLERANCE_KM: Final = 1000.0
@@ -27,6 +27,7 @@ VELOCITY_TOLERANCE_M_S: Final = 1.0
 """Largest velocity error at arrival (GTOC5, GTOC7 and GTOC12 problem statements)."""
 
 _MASS_TOLERANCE_KG = 0.01
+_SPEED_TOLERANCE_M_S = 1e-6
 _THROTTLE_TOLERANCE = 1e-6
 _TIME_TOLERANCE_DAYS = 1e-6
 _ELEMENT_TOLERANCE = 1e-12
@@ -90,8 +91,8 @@ def verify_tour(tour: Tour, catalogue: Catalogue | None = None) -> Verification:
     Verification
         All checks; a tour without legs passes if its start is allowed.
     """
-    checks = [*_check_order(tour), *_check_times(tour), *_check_masses(tour)]
-    checks += [*_check_thrust(tour), *_check_arrivals(tour)]
+    checks = [*_check_order(tour), *_check_velocities(tour), *_check_times(tour)]
+    checks += [*_check_masses(tour), *_check_thrust(tour), *_check_arrivals(tour)]
     if catalogue is not None:
         checks.append(_check_elements(tour, catalogue))
     return Verification(tuple(checks))
@@ -100,14 +101,23 @@ def verify_tour(tour: Tour, catalogue: Catalogue | None = None) -> Verification:
 def _check_order(tour: Tour) -> list[Check]:
     ids = [body.id for body in tour.bodies]
     chain = [(leg.from_id, leg.to_id) for leg in tour.legs]
-    linked = chain == list(pairwise(ids))
+    stops = [ids[0], *(leg.to_id for leg in tour.legs if not leg.is_fly_by)]
+    places = [ids[0], *(leg.to_id for leg in tour.legs)]
+    linked = chain == list(pairwise(places)) and stops == ids
     repeated = sorted({body for body in ids if ids.count(body) > 1})
     start_ids = tour.rules.start_ids
+    astray = _astray_fly_bys(tour)
     return [
         Check(
             "legs join the bodies in order", linked, "joined" if linked else str(chain), "joined"
         ),
         Check("no body twice", not repeated, str(repeated) if repeated else "none", "none"),
+        Check(
+            "fly-bys of bodies met before, once each",
+            not astray,
+            str(astray) if astray else "all",
+            "all" if tour.rules.gtoc5 is not None else "no fly-bys",
+        ),
         Check(
             "start body allowed",
             not start_ids or ids[0] in start_ids,
@@ -117,12 +127,63 @@ def _check_order(tour: Tour) -> list[Check]:
     ]
 
 
+def _astray_fly_bys(tour: Tour) -> list[int]:
+    """Return the bodies of fly-bys that the rules do not allow."""
+    fly_bys = [(k, leg.to_id) for k, leg in enumerate(tour.legs) if leg.is_fly_by]
+    if tour.rules.gtoc5 is None:
+        return [body for _, body in fly_bys]
+    astray, passed = [], set()
+    for k, body in fly_bys:
+        met = any(leg.to_id == body and not leg.is_fly_by for leg in tour.legs[:k])
+        if not met or body in passed:
+            astray.append(body)
+        passed.add(body)
+    return astray
+
+
+def _check_velocities(tour: Tour) -> list[Check]:
+    """Check where velocities relative to bodies come from: the launch, or the fly-by before."""
+    rules = tour.rules.gtoc5
+    launch = float(np.linalg.norm(tour.legs[0].dep_velocity_m_s)) if tour.legs else 0.0
+    most = 0.0 if rules is None else rules.launch_speed_max_m_s
+    jump, wait = 0.0, 0.0
+    for leg, following in pairwise(tour.legs):
+        change = np.subtract(following.dep_velocity_m_s, leg.arr_velocity_m_s)
+        jump = max(jump, float(np.linalg.norm(change)))
+        if leg.is_fly_by:
+            wait = max(wait, abs(following.t_dep_mjd2000 - leg.t_arr_mjd2000))
+    return [
+        Check(
+            "launch speed",
+            launch <= most + _SPEED_TOLERANCE_M_S,
+            f"{launch:.6f} m/s",
+            f"{most:g} m/s",
+        ),
+        Check(
+            "velocity continuous along the tour",
+            jump <= _SPEED_TOLERANCE_M_S,
+            f"largest jump {jump:.2e} m/s",
+            f"{_SPEED_TOLERANCE_M_S:g} m/s",
+        ),
+        Check(
+            "no stay after a fly-by",
+            wait <= _TIME_TOLERANCE_DAYS,
+            f"longest {wait:.2e} days",
+            f"{_TIME_TOLERANCE_DAYS:g} days",
+        ),
+    ]
+
+
 def _check_times(tour: Tour) -> list[Check]:
     rules = tour.rules
     earliest, latest = rules.first_departure_mjd2000
     departure = tour.legs[0].t_dep_mjd2000 if tour.legs else tour.t_start_mjd2000
     outside = max(earliest - departure, departure - latest)
-    stays = [following.t_dep_mjd2000 - leg.t_arr_mjd2000 for leg, following in pairwise(tour.legs)]
+    stays = [
+        following.t_dep_mjd2000 - leg.t_arr_mjd2000
+        for leg, following in pairwise(tour.legs)
+        if not leg.is_fly_by
+    ]
     shortest = min(stays, default=np.inf)
     positive = all(leg.tof_days > 0 for leg in tour.legs)
     return [
@@ -152,6 +213,7 @@ def _check_masses(tour: Tour) -> list[Check]:
     masses = [rules.m0_kg]
     gap = 0.0
     rocket = 0.0
+    unlike = 0.0
     exhaust = rules.isp_s * rules.g0_m_s2
     for leg in tour.legs:
         # Masses as the impulses say them: from the leg's start, across each impulse, to its end.
@@ -163,8 +225,15 @@ def _check_masses(tour: Tour) -> list[Check]:
             speed = float(np.linalg.norm(impulse.dv_m_s))
             expected = impulse.mass_before_kg * np.exp(-speed / exhaust)
             rocket = max(rocket, abs(expected - impulse.mass_after_kg))
-        masses.append(leg.m_final_kg)
+        unlike = max(unlike, abs(leg.dropped_kg - _drop_kg(leg, rules)))
+        masses.append(leg.m_final_kg - leg.dropped_kg)
     return [
+        Check(
+            "masses left behind",
+            unlike <= _MASS_TOLERANCE_KG,
+            f"largest difference {unlike:.2e} kg",
+            f"{_MASS_TOLERANCE_KG} kg",
+        ),
         Check(
             "mass continuous along the tour",
             gap <= _MASS_TOLERANCE_KG,
@@ -184,6 +253,13 @@ def _check_masses(tour: Tour) -> list[Check]:
             f"at least {rules.m_dry_kg:.3f} kg",
         ),
     ]
+
+
+def _drop_kg(leg: TourLeg, rules: TourRules) -> float:
+    """Return what the rules want to be left at the end of a leg."""
+    if rules.gtoc5 is None:
+        return 0.0
+    return rules.gtoc5.penetrator_kg if leg.is_fly_by else rules.gtoc5.package_kg
 
 
 def _check_thrust(tour: Tour) -> list[Check]:
@@ -224,10 +300,17 @@ def _check_thrust(tour: Tour) -> list[Check]:
 
 
 def _check_arrivals(tour: Tour) -> list[Check]:
-    misses_km, errors_m_s = [0.0], [0.0]
-    for leg, departure, arrival in zip(tour.legs, tour.bodies[:-1], tour.bodies[1:], strict=True):
-        reached = _fly(leg, departure, tour.rules)
-        target = body_state(arrival, leg.t_arr_mjd2000, tour.rules.mu_m3_s2)
+    misses_km, errors_m_s, slowest = [0.0], [0.0], np.inf
+    least = 0.0 if tour.rules.gtoc5 is None else tour.rules.gtoc5.fly_by_speed_min_m_s
+    bodies = {body.id: body for body in tour.bodies}
+    for leg in tour.legs:
+        if leg.from_id not in bodies or leg.to_id not in bodies:
+            continue  # Found by the check of the order.
+        reached = _fly(leg, bodies[leg.from_id], tour.rules)
+        target = body_state(bodies[leg.to_id], leg.t_arr_mjd2000, tour.rules.mu_m3_s2)
+        if leg.is_fly_by:
+            slowest = min(slowest, float(np.linalg.norm(reached[3:] - target[3:])))
+        target[3:] += leg.arr_velocity_m_s
         misses_km.append(float(np.linalg.norm(reached[:3] - target[:3])) / 1e3)
         errors_m_s.append(float(np.linalg.norm(reached[3:] - target[3:])))
     return [
@@ -243,17 +326,27 @@ def _check_arrivals(tour: Tour) -> list[Check]:
             f"largest error {max(errors_m_s):.6f} m/s",
             f"{VELOCITY_TOLERANCE_M_S:g} m/s",
         ),
+        Check(
+            "speed of fly-bys",
+            slowest >= least,
+            f"slowest {slowest:.3f} m/s",
+            f"at least {least:g} m/s",
+        ),
     ]
 
 
 def _check_elements(tour: Tour, catalogue: Catalogue) -> Check:
     worst = 0.0
+    planet = earth()
     for body in tour.bodies:
-        row = int(catalogue.rows_of(np.asarray([body.id]))[0])
+        # No table has the Earth; problems that start there have its elements in the statement.
+        is_earth = tour.rules.gtoc5 is not None and body.id == planet.ids[0]
+        table = planet if is_earth else catalogue
+        row = int(table.rows_of(np.asarray([body.id]))[0])
         angles = [body.i_rad, body.node_rad, body.argp_rad, body.mean_anomaly_rad]
         ours = np.array([body.a_m / AU, body.e, *angles, body.epoch_mjd2000])
-        elements = catalogue.elements[row] / np.array([AU, 1, 1, 1, 1, 1])
-        theirs = np.append(elements, catalogue.epoch_mjd2000[row])
+        elements = table.elements[row] / np.array([AU, 1, 1, 1, 1, 1])
+        theirs = np.append(elements, table.epoch_mjd2000[row])
         worst = max(worst, float(np.abs(ours - theirs).max()))
     return Check(
         "elements as in the table",
@@ -294,6 +387,7 @@ def body_state(body: TourBody, t_mjd2000: float, mu: float) -> NDArray[np.float6
 def _fly(leg: TourLeg, departure: TourBody, rules: TourRules) -> NDArray[np.float64]:
     """Integrate a leg from its departure body through all impulses to its arrival epoch."""
     state = body_state(departure, leg.t_dep_mjd2000, rules.mu_m3_s2)
+    state[3:] += leg.dep_velocity_m_s
     t = leg.t_dep_mjd2000
     for impulse in leg.impulses:
         state = _coast(state, (impulse.t_mjd2000 - t) * DAY_S, rules.mu_m3_s2)
