@@ -30,7 +30,8 @@ says in a minute whether that is worth while.
    answers for any spacecraft.
 
 Legs, checkpoint and report.json go to the folder OUT.retrain; the same command
-goes on where an interrupted one stopped. A leg takes 2 to 5 ms of a core.
+goes on where an interrupted one stopped. A leg takes 2 to 9 ms of a core, all
+by default 4 to 8 minutes of two; on fewer cores give fewer --legs.
 
 The spacecraft is a TOML file with these keys:
 
@@ -58,9 +59,9 @@ def add_parser(commands: Any) -> None:
     parser.add_argument("--out", required=True, metavar="MODEL", help="file of the model")
     parser.add_argument("--start", default="default", help="model to go on from (the package's)")
     for name, default, text in (
-        ("legs", 40_000, "legs of the spacecraft to learn from"),
+        ("legs", 60_000, "legs of the spacecraft to learn from"),
         ("test-legs", 6000, "legs of the spacecraft to be judged on"),
-        ("general-legs", 8000, "legs of any spacecraft to learn from"),
+        ("general-legs", 12_000, "legs of any spacecraft to learn from"),
         ("general-test-legs", 1500, "legs of any spacecraft to be judged on"),
         ("epochs", 15, "passes of the fine-tuning over the legs"),
     ):

@@ -1,5 +1,7 @@
 """The TOML file of a user's spacecraft."""
 
+from pathlib import Path
+
 import pytest
 
 from feasibility import InputError
@@ -18,6 +20,11 @@ def test_the_example_says_what_the_defaults_are(tmp_path):
     craft = read(tmp_path, EXAMPLE)
     assert craft.sampling == Sampling()
     assert (craft.thrust_n, craft.isp_s, craft.m0_kg) == (0.3, 3000.0, (800.0, 2000.0))
+
+
+def test_the_document_shows_the_example():
+    document = Path(__file__).parents[1] / "docs" / "spacecraft.md"
+    assert EXAMPLE in document.read_text(encoding="utf-8")
 
 
 def test_four_keys_are_enough_and_legs_are_those_of_the_spacecraft(tmp_path):

@@ -201,7 +201,7 @@ def judgement(
     recall_asked: float,
     recall: Share,
 ) -> tuple[str, tuple[str, ...]]:
-    """Return the verdict and its reasons: docs/classifier.md states the rule.
+    """Return the verdict and its reasons: docs/spacecraft.md states the rule.
 
     Parameters are those of `Assessment`; `sides` are the shares behind the balanced accuracy.
     """
@@ -227,7 +227,7 @@ def judgement(
             f"within 15 % {within_15_percent.value:.4f}, below {LEAST_WITHIN_15_PERCENT:g}"
         )
     if recall.interval[1] < recall_asked:
-        against.append(f"recall surely below {recall_asked:g}: at most {recall.interval[1]:.4f}")
+        against.append(f"recall surely below {recall_asked:g}: at most {recall.interval[1]:.5f}")
     return ("retrain" if against else "good enough"), tuple(against)
 
 

@@ -68,9 +68,9 @@ class RetrainSettings:
         "cpu", "cuda" or "auto".
     """
 
-    legs: int = 40_000
+    legs: int = 60_000
     test_legs: int = 6000
-    general_legs: int = 8000
+    general_legs: int = 12_000
     general_test_legs: int = 1500
     epochs: int = 15
     learning_rate: float = 7e-4
@@ -129,7 +129,11 @@ class Retrained:
             UNCHANGED: "neither fine-tuning nor a new calibration helps; the model it started "
             "from is saved as it is",
         }
-        return texts[self.choice]
+        wide = {name: figures["wrong"] for name, figures in self.general.items()}
+        return (
+            f"{texts[self.choice]}; of {self.general[UNCHANGED]['n']:.0f} legs of any spacecraft "
+            f"it gets {wide[self.choice]:.0f} wrong, {wide[UNCHANGED]:.0f} before"
+        )
 
 
 def retrain(
@@ -211,15 +215,14 @@ def retrain(
         "settings": asdict(settings),
         "own": own,
         "general": general,
+        "provenance": provenance(),
     }
     artefact = dataclasses.replace(
         chosen,
         metrics={**chosen.metrics, "retrain": {"own": own[choice], "general": general[choice]}},
-        provenance={**provenance(), **chosen.provenance, "retrain": report},
+        provenance={**chosen.provenance, "retrain": report},
     )
-    write_text(
-        folder / REPORT, json.dumps({**report, "provenance": provenance()}, indent=1) + "\n"
-    )
+    write_text(folder / REPORT, json.dumps(report, indent=1) + "\n")
     checkpoint.unlink(missing_ok=True)
     return Retrained(artefact, choice, own, general)
 
