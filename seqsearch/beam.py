@@ -62,6 +62,7 @@ def search(
     *,
     pruner: Pruner | None = None,
     predictor: LegPredictor | None = None,
+    audit_predictor: LegPredictor | None = None,
     beam_width: int | None = None,
     settings: SearchSettings | None = None,
     ranking: Ranking | None = None,
@@ -85,6 +86,8 @@ def search(
     predictor : LegPredictor, optional
         Finds flight times and tells which hops are worth optimising; default:
         the classifier of the pruner, if that has one.
+    audit_predictor : LegPredictor, optional
+        Sorts the pruned hops for the audit; default: `predictor`.
     beam_width : int, optional
         Overrides ``settings.beam_width``.
     settings : SearchSettings, optional
@@ -136,11 +139,13 @@ def search(
     if resume is not None:
         rng.bit_generator.state = resume.rng_state
     pruner = pruner or parse_pruner(settings.pruner)
+    predictor = predictor or predictor_of(pruner)
     return _Search(
         problem,
         settings,
         pruner,
-        predictor or predictor_of(pruner),
+        predictor,
+        audit_predictor or predictor,
         ranking,
         LegOptimiser(executor),
         Deadline(None if time_limit_s is None else time_limit_s - state.spent_s),
@@ -162,6 +167,7 @@ class _Search:
         settings: SearchSettings,
         pruner: Pruner,
         predictor: LegPredictor | None,
+        audit_predictor: LegPredictor | None,
         ranking: Ranking | None,
         optimiser: LegOptimiser,
         deadline: Deadline,
@@ -175,6 +181,7 @@ class _Search:
         self._settings = settings
         self._pruner = pruner if isinstance(pruner, AllOf) else AllOf(pruner)
         self._predictor = predictor
+        self._audit_predictor = audit_predictor
         self._optimiser = optimiser
         self._deadline = deadline
         self._max_solves = max_solves
@@ -314,7 +321,7 @@ class _Search:
         solves = self._state.settings.audit_per_rank
         if solves == 0 or self._pruner.pruners == ():
             return None
-        return RankSample(self._rng, len(self._state.counters), solves, self._predictor)
+        return RankSample(self._rng, len(self._state.counters), solves, self._audit_predictor)
 
     def _audit(
         self,
