@@ -17,7 +17,7 @@ from seqsearch.counters import RankCounters
 from seqsearch.deadline import Deadline
 from seqsearch.expanders import Expander, ForecastExpander, GridExpander
 from seqsearch.expansion import Candidates, reached
-from seqsearch.frontier import Frontier, make_frontier
+from seqsearch.frontier import Frontier, make_frontier, no_nodes
 from seqsearch.nodes import Nodes
 from seqsearch.optimisation import LegOptimiser, Optimised, SolvedHops
 from seqsearch.own_moves import OwnMoves
@@ -204,13 +204,13 @@ class _Search:
         stopped = "complete"
         try:
             if state.waiting is not None:
+                self._begin_pass()
                 self._run_pass(state.waiting)
             while (
                 endless or state.pass_number < self._settings.passes
             ) and not self._out_of_budget():
                 state.pass_number += 1
-                if self._pacer is not None:
-                    self._pacer.begin_pass(state.pass_number)
+                self._begin_pass()
                 self._run_pass(self._start_nodes())
         except KeyboardInterrupt:
             stopped = "interrupted"
@@ -219,6 +219,16 @@ class _Search:
         elif stopped == "complete" and self._out_of_budget():
             stopped = "solve limit"
         return SearchResult(self._best_tour(), state.tree, state.counters, stopped)
+
+    def _begin_pass(self) -> None:
+        """Under a time limit, as many starts as the beam is going to be wide."""
+        if self._pacer is None:
+            return
+        state = self._state
+        self._pacer.begin_pass(state.pass_number)
+        width = self._pacer.width(no_nodes(), state.settings, state.counters)
+        starts = max(width, self._settings.starts)
+        state.settings = state.settings.with_(beam_width=width, starts=starts)
 
     def _make_ranking(self) -> Ranking:
         return self._given_ranking or make_ranking(
@@ -253,7 +263,8 @@ class _Search:
                 width = self._pacer.width(nodes, state.settings, state.counters)
                 state.settings = state.settings.with_(beam_width=width)
                 frontier = _remade(frontier, state.settings, self._problem, ranking)
-                nodes = nodes.take(np.arange(min(len(nodes), width)))
+                if nodes.depth.min() > 0:
+                    nodes = nodes.take(np.arange(min(len(nodes), width)))
             counters = RankCounters(
                 pass_number=state.pass_number, rank=int(nodes.depth.max()) + 1, nodes=len(nodes)
             )

@@ -34,6 +34,10 @@ _QUICK_DOUBT: Final = 0.1
 """Quick answers are hardly ever further off than this in log(m*/m0)."""
 
 
+_MASS_DOUBT: Final = 0.02
+"""Share of the predicted propellant by which a hop may seem to fall below the dry mass."""
+
+
 @final
 @dataclass(frozen=True, eq=False)
 class Prospects:
@@ -220,9 +224,7 @@ class Forecast:
             part = prospects.take(pair[rows])
             hops = self._hops(nodes, part, tof_days[rows])
             margin = np.exp(part.curves.log_margin(tof_days[rows]))
-            return hops, np.maximum(
-                bounded_final_mass(hops.stages[-1], margin), hops.stages[-1].m_dry
-            )
+            return hops, bounded_final_mass(hops.stages[-1], margin)
 
         blocks = [
             np.arange(first, min(first + _PAIRS_AT_ONCE, len(pair)))
@@ -234,7 +236,10 @@ class Forecast:
             prospects.target[pair],
             Hops.concatenate([hops for hops, _ in parts]),
         )
-        return candidates, np.concatenate([m_final for _, m_final in parts]), pair
+        m_final = np.concatenate([mass for _, mass in parts])
+        last = candidates.hops.stages[-1]
+        enough = m_final >= last.m_dry - _MASS_DOUBT * (last.m0 - m_final)
+        return candidates.take(enough), m_final[enough], pair[enough]
 
     def flyable(self, hops: Hops, settings: SearchSettings) -> NDArray[np.bool_]:
         """Return (n,) whether the good answers do not speak against n hops."""

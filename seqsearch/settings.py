@@ -20,7 +20,10 @@ class SearchSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
     Parameters
     ----------
     beam_width : int
-        Nodes kept at each rank.
+        Nodes kept at each rank, where there is no time limit.
+    max_beam_width : int
+        Most nodes kept at one rank under a time limit, where passes are as wide as the
+        time allows.
     starts : int
         Start nodes of a pass: the asteroid-epoch pairs with the densest neighbourhoods.
     start_epochs : int
@@ -53,6 +56,9 @@ class SearchSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
         Most children of one node that are kept.
     max_per_cell : int
         Most nodes kept at one rank at one asteroid within the same `cell_days`.
+    max_start_share : float
+        Most nodes kept at one rank that started at the same body, as a share of the beam
+        width; 1 for no limit.
     cell_days : float
         Width of the epoch cells of `max_per_cell`.
     time_weight, propellant_weight : float
@@ -76,6 +82,7 @@ class SearchSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
     """
 
     beam_width: _Count = 200
+    max_beam_width: _Count = 6000
     starts: _Count = 300
     start_epochs: _Count = 40
     neighbours: _Count = 60
@@ -89,10 +96,11 @@ class SearchSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
     departure_delays_days: tuple[Annotated[float, Meta(ge=0)], ...] = (0.0,)
     pruner: str = "lambert:1.3,mima2:0.97"
     solver: str = "fast"
-    solves_per_rank: _Count = 4000
+    solves_per_rank: _Count = 8000
     flyable_per_target: _Count = 2
     max_per_parent: _Count = 10
     max_per_cell: _Count = 3
+    max_start_share: Annotated[float, Meta(gt=0, le=1)] = 0.1
     cell_days: _Positive = 20.0
     time_weight: Annotated[float, Meta(ge=0)] = 1.0
     propellant_weight: Annotated[float, Meta(ge=0)] = 0.6

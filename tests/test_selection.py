@@ -1,6 +1,7 @@
 """Beam selection: the caps hold, and nothing better was left out."""
 
 from collections import Counter
+from dataclasses import replace
 
 import numpy as np
 from hypothesis import given
@@ -66,6 +67,30 @@ def test_selection_keeps_every_cap_and_leaves_out_nothing_better(
         before = Counter(key for j in better for key in keys(j))
         full = len(better) == beam_width
         assert full or any(before[key] >= limits[key[0]] for key in keys(i))
+
+
+def test_no_start_body_takes_more_than_its_share():
+    rng = np.random.default_rng(5)
+    n = 400
+    nodes = _nodes(
+        rng.integers(0, 60, n).tolist(),
+        rng.uniform(0, 1000, n).tolist(),
+        rng.integers(100, 200, n).tolist(),
+        list(range(n)),
+    )
+    start = rng.choice([1000, 1001, 1002, 1003, 1004], n, p=[0.8, 0.05, 0.05, 0.05, 0.05])
+    visited = nodes.visited.copy()
+    visited[:, 0] = start
+    nodes = replace(nodes, visited=visited)
+    score = np.where(start == 1000, 0.0, 1.0) + rng.random(n)
+    wide = SearchSettings(beam_width=40, max_start_share=1.0)
+    assert np.all(start[select(score, nodes, wide)] == 1000)
+    fair = SearchSettings(beam_width=40, max_start_share=0.25)
+    counts = Counter(start[select(score, nodes, fair)].tolist())
+    assert counts[1000] == 10
+    assert sum(counts.values()) == 40
+    tight = SearchSettings(beam_width=40, max_start_share=0.01)
+    assert set(Counter(start[select(score, nodes, tight)].tolist()).values()) == {8}
 
 
 def test_an_empty_rank_gives_an_empty_beam():

@@ -11,8 +11,9 @@ from feasibility.constants import DAY_S
 from feasibility.errors import InputError
 from feasibility.orbits.catalogue import Catalogue
 
-_MAX_TREES: Final = 64
-"""Trees kept at a time: 5 years of 30-day buckets, 400 MB for 83 000 bodies."""
+_MAX_POINTS: Final = 5_000_000
+"""Points in all trees that are kept at a time: 400 MB, 5 years of 30-day buckets for 83 000 bodies,
+25 years for 16 000."""
 
 
 def orbital_metric(states: ArrayLike, reference_tof_days: float) -> NDArray[np.float64]:
@@ -131,7 +132,7 @@ class OrbitalNeighbours:
             states = self._catalogue.states(bucket * self._bucket_days)
             tree = cKDTree(orbital_metric(states, self._reference_tof_days))
             self._trees[bucket] = tree
-            if len(self._trees) > _MAX_TREES:
+            if len(self._trees) * len(self._catalogue) > _MAX_POINTS:
                 self._trees.popitem(last=False)
         else:
             self._trees.move_to_end(bucket)
