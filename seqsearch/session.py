@@ -9,8 +9,9 @@ from typing import final
 
 import numpy as np
 
-from feasibility import InputError, Pruner
+from feasibility import AllOf, InputError, Pruner
 from feasibility.pruners import PrunerContractError
+from feasibility.pruners.predictor import LegPredictor
 from feasibility.sims_flanagan.prepare import compile_kernels, sample_leg
 from feasibility.workers import worker_pool
 from seqsearch.audit_estimate import AuditEstimate
@@ -19,6 +20,7 @@ from seqsearch.checkpoint import Checkpoints
 from seqsearch.config import Config
 from seqsearch.counters import RankCounters
 from seqsearch.plots import plot_tour
+from seqsearch.pruner_spec import predictor_of
 from seqsearch.run_folder import RunFolder
 from seqsearch.state import SearchState
 from seqsearch.tour import Tour
@@ -62,7 +64,7 @@ def run_session(
     *,
     config: Config,
     problem: TourProblem,
-    pruner: Pruner,
+    pruner: AllOf,
     budget: Budget,
 ) -> int:
     """Search from a state to the end, or until a budget is used up, and return the exit code.
@@ -90,6 +92,7 @@ def run_session(
             result = search(
                 problem,
                 pruner=pruner,
+                audit_predictor=_audit_predictor(config, pruner),
                 settings=config.search,
                 rng=np.random.default_rng(checkpoints.origin.seed),
                 executor=executor,
@@ -108,6 +111,16 @@ def run_session(
     plot_tour(result.tour, folder.path / "tour.png")
     _report(folder.path, result, mended)
     return 0
+
+
+def _audit_predictor(config: Config, pruner: AllOf) -> LegPredictor | None:
+    """Return what sorts the audit's legs: the default model, where the pruner has none."""
+    if config.search.audit_per_rank == 0 or pruner.pruners == ():
+        return None
+    # Imported here: a search without audit and model shall not pay for the model's kernels.
+    from feasibility.classifier import FeasibilityClassifier
+
+    return predictor_of(pruner) or FeasibilityClassifier.load()
 
 
 def _report(path: Path, result: SearchResult, mended: int) -> None:
