@@ -245,7 +245,13 @@ class _Search:
                     "default:0.99"
                 )
             return OwnMovesExpander(
-                problem, problem, self._predictor, self._pruner, ranking, self._optimiser
+                problem,
+                problem,
+                self._predictor,
+                self._pruner,
+                ranking,
+                self._optimiser,
+                self._threads,
             )
         if self._predictor is None:
             return GridExpander(*means)

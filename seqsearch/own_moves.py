@@ -50,11 +50,12 @@ class OwnMoves(Protocol):
         ...
 
     def moves(
-        self, nodes: Nodes, settings: SearchSettings, predictor: LegPredictor, /
+        self, nodes: Nodes, settings: SearchSettings, predictor: LegPredictor, threads: int, /
     ) -> Iterator[Proposal]:
         """Propose moves from nodes of one depth that respect the problem's limits.
 
-        Together they are ordered by node; empty proposals are left out.
+        Together they are ordered by node, whatever the number of threads; empty
+        proposals are left out.
         """
         ...
 

@@ -42,6 +42,8 @@ class OwnMovesExpander:
         What is optimised first.
     optimiser : LegOptimiser
         How it is optimised.
+    threads : int
+        Threads in which the problem may ask.
     """
 
     def __init__(
@@ -52,6 +54,7 @@ class OwnMovesExpander:
         pruner: AllOf,
         ranking: Ranking,
         optimiser: LegOptimiser,
+        threads: int,
     ) -> None:
         self._problem = problem
         self._moves = moves
@@ -59,6 +62,7 @@ class OwnMovesExpander:
         self._pruner = pruner
         self._ranking = ranking
         self._optimiser = optimiser
+        self._threads = threads
 
     def expand(
         self,
@@ -72,7 +76,7 @@ class OwnMovesExpander:
         """Return the hops found; None where nothing was worth optimising."""
         clock = time.perf_counter()
         candidates, found = [], []
-        for proposal in self._moves.moves(nodes, settings, self._predictor):
+        for proposal in self._moves.moves(nodes, settings, self._predictor, self._threads):
             counters.proposed += len(proposal.candidates)
             counters.questions += proposal.questions
             candidates.append(proposal.candidates)

@@ -196,7 +196,7 @@ def test_proposed_hops_are_chains_that_the_solver_flies(classifier):
     problem = toy_problem()
     settings = Settings(neighbours=30, tof_days_max=400.0)
     nodes = _node_at(problem, 5, 900.0)
-    (proposal,) = problem.moves(nodes, settings, classifier)
+    (proposal,) = problem.moves(nodes, settings, classifier, 2)
     hops = proposal.candidates.hops
     fly_by, transfer = hops.stages
     assert proposal.questions > len(hops)
@@ -217,7 +217,9 @@ def test_proposed_hops_are_chains_that_the_solver_flies(classifier):
 
 def test_fly_bys_take_the_time_that_the_stretch_asks_for(classifier):
     problem = toy_problem()
-    forecast = Gtoc5Forecast(problem.maker, classifier, Settings())
+    forecast = Gtoc5Forecast(
+        problem.maker, phase_free_points(problem.catalogue), classifier, Settings()
+    )
     days = forecast.fly_by_days(7, 8000.0, 700.0)
     assert np.array_equal(days[: len(days) // 2], days[len(days) // 2 :])
     closed = float(shortest_self_fly_by_days(700.0, problem.maker.fly_by_speed_m_s, 0.3))
@@ -227,9 +229,9 @@ def test_fly_bys_take_the_time_that_the_stretch_asks_for(classifier):
 def test_a_node_without_time_or_mass_for_a_last_fly_by_proposes_nothing(classifier):
     settings = Settings(neighbours=30, tof_days_max=400.0)
     short = toy_problem(max_duration_days=60.0)
-    assert list(short.moves(_node_at(short, 5, 900.0), settings, classifier)) == []
+    assert list(short.moves(_node_at(short, 5, 900.0), settings, classifier, 1)) == []
     problem = toy_problem()
-    assert list(problem.moves(_node_at(problem, 5, 560.0), settings, classifier)) == []
+    assert list(problem.moves(_node_at(problem, 5, 560.0), settings, classifier, 1)) == []
 
 
 def test_plain_hops_have_lambert_fly_bys_and_launches():

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from feasibility import Legs
 from feasibility.pruners.predictor import LegPredictor, QuickPredictor
 from seqsearch.gtoc5.directions import even_directions
-from seqsearch.gtoc5.element_distance import phase_free_points
 from seqsearch.gtoc5.lambert_departure import lambert_departure
 from seqsearch.gtoc5.leg_maker import LegMaker
 from seqsearch.gtoc5.self_fly_by import shortest_self_fly_by_days
@@ -63,6 +62,8 @@ class Gtoc5Forecast:
     ----------
     maker : LegMaker
         Makes the legs.
+    points : (n, 5) float64, m/s
+        The bodies in the space of the elements, see `phase_free_points`.
     predictor : LegPredictor
         Whom to ask; a `QuickPredictor` for its quick answers first.
     settings : SearchSettings
@@ -75,7 +76,13 @@ class Gtoc5Forecast:
         Legs that the predictor was asked about so far.
     """
 
-    def __init__(self, maker: LegMaker, predictor: LegPredictor, settings: SearchSettings) -> None:
+    def __init__(
+        self,
+        maker: LegMaker,
+        points: _Array,
+        predictor: LegPredictor,
+        settings: SearchSettings,
+    ) -> None:
         self._maker = maker
         self._predictor = predictor
         self._quick = (
@@ -83,7 +90,7 @@ class Gtoc5Forecast:
         )
         self._settings = settings
         self.questions = 0
-        self._points = phase_free_points(maker.catalogue)
+        self._points = points
         self._directions = even_directions(_DIRECTIONS)
 
     def launches(self, row: int, t: float, mass: float) -> Visits | None:

@@ -13,7 +13,9 @@ from feasibility.orbits import Catalogue, earth
 from feasibility.pruners.predictor import LegPredictor, bounded_final_mass
 from feasibility.sims_flanagan import solve_max_initial_mass
 from seqsearch.expansion import Candidates
+from seqsearch.forecast import in_threads
 from seqsearch.gtoc5.directions import even_directions
+from seqsearch.gtoc5.element_distance import phase_free_points
 from seqsearch.gtoc5.forecast import FLY_BY_STRETCH, Gtoc5Forecast
 from seqsearch.gtoc5.lambert_departure import lambert_departure
 from seqsearch.gtoc5.leg_maker import LegMaker
@@ -128,6 +130,10 @@ class Gtoc5Problem:
         """What makes the legs."""
         return LegMaker(self.catalogue, self.spacecraft, self.rules)
 
+    @cached_property
+    def _points(self) -> _Array:
+        return phase_free_points(self.catalogue)
+
     def start_rows(self) -> NDArray[np.intp]:
         """Return the catalogue row of the Earth."""
         return np.zeros(1, dtype=np.intp)
@@ -147,32 +153,39 @@ class Gtoc5Problem:
         return self.start_nodes(np.zeros(n, dtype=np.intp), epochs)
 
     def moves(
-        self, nodes: Nodes, settings: SearchSettings, predictor: LegPredictor, /
+        self, nodes: Nodes, settings: SearchSettings, predictor: LegPredictor, threads: int, /
     ) -> Iterator[Proposal]:
         """Propose launches or hops from each node, at several flight times for each target."""
-        forecast = Gtoc5Forecast(self.maker, predictor, settings)
-        for k in range(len(nodes)):
-            row, t, mass = int(nodes.row[k]), float(nodes.t_ready_mjd2000[k]), float(nodes.mass[k])
-            launch = bool(nodes.depth[k] == 0)
-            before = forecast.questions
-            if launch:
-                visits = forecast.launches(row, t, mass)
-            else:
-                visits = forecast.hops(row, t, mass, nodes.visited[k, : nodes.depth[k] + 1])
-            if visits is None:
-                continue
-            parent = np.full(len(visits), k)
-            hops = self._chains(nodes, parent, np.full(len(visits), t), visits, launch=launch)
-            last = hops.stages[-1]
-            m_final = bounded_final_mass(last, np.exp(visits.log_margin))
-            first = t if launch else float(nodes.t_first_mjd2000[k])
-            within = self._leaves_room(hops.t_arr_mjd2000 - first, m_final)
-            if within.any():
-                yield Proposal(
-                    Candidates(parent, visits.target, hops).take(within),
-                    m_final[within],
-                    forecast.questions - before,
-                )
+
+        def propose(k: int) -> Proposal | None:
+            return self._proposal(nodes, k, settings, predictor)
+
+        for proposal in in_threads(propose, range(len(nodes)), threads):
+            if proposal is not None:
+                yield proposal
+
+    def _proposal(
+        self, nodes: Nodes, k: int, settings: SearchSettings, predictor: LegPredictor
+    ) -> Proposal | None:
+        """Return the moves from one node; None for none."""
+        forecast = Gtoc5Forecast(self.maker, self._points, predictor, settings)
+        row, t, mass = int(nodes.row[k]), float(nodes.t_ready_mjd2000[k]), float(nodes.mass[k])
+        launch = bool(nodes.depth[k] == 0)
+        if launch:
+            visits = forecast.launches(row, t, mass)
+        else:
+            visits = forecast.hops(row, t, mass, nodes.visited[k, : nodes.depth[k] + 1])
+        if visits is None:
+            return None
+        parent = np.full(len(visits), k)
+        hops = self._chains(nodes, parent, np.full(len(visits), t), visits, launch=launch)
+        m_final = bounded_final_mass(hops.stages[-1], np.exp(visits.log_margin))
+        first = t if launch else float(nodes.t_first_mjd2000[k])
+        within = self._leaves_room(hops.t_arr_mjd2000 - first, m_final)
+        if not within.any():
+            return None
+        candidates = Candidates(parent, visits.target, hops).take(within)
+        return Proposal(candidates, m_final[within], forecast.questions)
 
     def hops(
         self,
