@@ -49,7 +49,7 @@ def test_a_run_writes_its_folder_and_verifies(run_folder, capsys):
     names = {path.name for path in run_folder.iterdir()}
     assert names == {
         "config.toml", "provenance.json", "counters.csv", "sequence.json", "sequence.csv",
-        "tour.png",
+        "tour.png", "audit.json", "checkpoints",
     }  # fmt: skip
     assert tomllib.loads((run_folder / "config.toml").read_text())["search"]["beam_width"] == 3
     provenance = json.loads((run_folder / "provenance.json").read_text())
@@ -78,9 +78,12 @@ def test_a_tampered_sequence_fails_with_exit_code_1(run_folder, capsys):
 
 
 def test_an_existing_run_folder_is_left_alone(run_folder, problem_file, capsys):
-    before = {path: path.read_bytes() for path in run_folder.iterdir()}
+    def contents():
+        return {path: path.read_bytes() for path in run_folder.rglob("*") if path.is_file()}
+
+    before = contents()
     _fails(["run", problem_file, "--out", run_folder], capsys, str(run_folder), "exists")
-    assert {path: path.read_bytes() for path in run_folder.iterdir()} == before
+    assert contents() == before
 
 
 def test_an_output_that_cannot_be_written_is_said(problem_file, tmp_path, capsys):
