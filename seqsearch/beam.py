@@ -27,7 +27,7 @@ from seqsearch.pruner_spec import parse_pruner, predictor_of
 from seqsearch.ranking import Ranking, TimePropellantRanking
 from seqsearch.rankings import make_ranking
 from seqsearch.settings import SearchSettings
-from seqsearch.starts import dense_starts
+from seqsearch.starts import dense_starts, reachable_starts
 from seqsearch.state import SearchState
 from seqsearch.tour import Tour
 from seqsearch.tour_problem import TourProblem
@@ -228,7 +228,10 @@ class _Search:
         self._pacer.begin_pass(state.pass_number)
         width = self._pacer.width(no_nodes(), state.settings, state.counters)
         starts = max(width, self._settings.starts)
-        state.settings = state.settings.with_(beam_width=width, starts=starts)
+        screen_legs = max(self._pacer.screen_legs(), self._settings.screen_legs)
+        state.settings = state.settings.with_(
+            beam_width=width, starts=starts, screen_legs=screen_legs
+        )
 
     def _make_ranking(self) -> Ranking:
         return self._given_ranking or make_ranking(
@@ -323,8 +326,7 @@ class _Search:
         if isinstance(self._problem, OwnMoves):
             nodes = self._problem.starts(state.settings, self._rng)
         else:
-            rows, epochs = dense_starts(self._problem, self._neighbours, state.settings, self._rng)
-            nodes = self._problem.start_nodes(rows, epochs)
+            nodes = self._problem.start_nodes(*self._choose_starts())
         ids = [
             state.tree.add_start(int(row), float(t), float(mass))
             for row, t, mass in zip(nodes.row, nodes.t_first_mjd2000, nodes.mass, strict=True)
@@ -332,6 +334,19 @@ class _Search:
         nodes = replace(nodes, tree_id=np.asarray(ids, dtype=np.int64))
         self._note_best(nodes)
         return nodes
+
+    def _choose_starts(self) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+        settings = self._state.settings
+        if self._predictor is None:
+            return dense_starts(self._problem, self._neighbours, settings, self._rng)
+        return reachable_starts(
+            self._problem,
+            self._neighbours,
+            self._predictor,
+            settings,
+            self._rng,
+            self._threads,
+        )
 
     def _sample(self) -> RankSample | None:
         """Return what draws this rank's audit; None without an audit or a pruner."""

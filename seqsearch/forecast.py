@@ -141,9 +141,7 @@ class Forecast:
         self._predictor = predictor
         self._neighbours = neighbours
         self._threads = threads
-        self._quick = (
-            predictor.quick_margin if isinstance(predictor, QuickPredictor) else predictor.margin
-        )
+        self._quick = quick_margin_of(predictor)
 
     def surveys(self, nodes: Nodes, settings: SearchSettings) -> Iterator[Survey]:
         """Look at the targets of nodes: nearest bodies x departure delays.
@@ -322,6 +320,13 @@ class Forecast:
         return self._problem.hops(
             nodes, prospects.parent, prospects.target, prospects.t_dep_mjd2000, tof_days
         )
+
+
+def quick_margin_of(predictor: LegPredictor) -> Callable[[Legs], _Array]:
+    """Return the predictor's quick answers, or the others if it has none."""
+    if isinstance(predictor, QuickPredictor):
+        return predictor.quick_margin
+    return predictor.margin
 
 
 def log_margin(ask: Callable[[Legs], _Array], hops: Hops) -> _Array:

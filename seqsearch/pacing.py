@@ -25,6 +25,10 @@ _GROWTH: Final = 3.0
 _NODE_S: Final = 0.02
 """What a node costs, as long as nothing is known: on the safe side."""
 
+_SCREEN_SHARE: Final = 0.05
+_SCREENED_LEG_S: Final = 5e-6
+"""Share of a pass that is spent on the choice of starts, and what a leg costs there."""
+
 _NARROWEST: Final = 10
 _RECENT: Final = 3
 
@@ -53,6 +57,10 @@ class Pacer:
         wanted = self._first_s * _GROWTH ** (pass_number - 1)
         seconds = wanted if (1.0 + _GROWTH / 2) * wanted < remaining else remaining
         self._end = time.monotonic() + seconds
+
+    def screen_legs(self) -> int:
+        """Return how many legs can be screened for starts in this pass."""
+        return int(_SCREEN_SHARE * max(0.0, self._end - time.monotonic()) / _SCREENED_LEG_S)
 
     def width(
         self, nodes: Nodes, settings: SearchSettings, counters: Sequence[RankCounters]

@@ -28,6 +28,9 @@ class SearchSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
         Start nodes of a pass: the asteroid-epoch pairs with the densest neighbourhoods.
     start_epochs : int
         Departure epochs at which neighbourhoods are looked at, spread over the window.
+    screen_legs : int
+        Legs that a predictor is asked about to find good starts; under a time limit about
+        one second in twenty is spent on it, if that is more.
     neighbours : int
         Targets proposed for each node: the nearest in the orbital metric.
     reference_tof_days : float
@@ -85,6 +88,7 @@ class SearchSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
     max_beam_width: _Count = 6000
     starts: _Count = 300
     start_epochs: _Count = 40
+    screen_legs: _Count = 150_000
     neighbours: _Count = 60
     reference_tof_days: _Positive = 180.0
     tof_days_min: _Positive = 60.0
