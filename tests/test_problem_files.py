@@ -1,12 +1,20 @@
 """Problem files and settings: what is accepted, and how mistakes are named."""
 
+import re
 from dataclasses import replace
+from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 
 from feasibility import InputError, Spacecraft
 from seqsearch.config import (
+    CatalogueTable,
+    Config,
+    MissionTable,
+    ProblemTable,
+    SpacecraftTable,
     build_problem,
     builtin_problems,
     load_problem,
@@ -15,6 +23,7 @@ from seqsearch.config import (
     to_toml,
     with_catalogue,
 )
+from seqsearch.gtoc5.rules import Gtoc5Rules
 from seqsearch.pruner_spec import parse_pruner
 from seqsearch.settings import SearchSettings
 from tests.problems import GTOC7_TABLE, small_problem
@@ -138,3 +147,25 @@ def test_pruner_specifications():
 def test_bad_pruner_specifications_are_refused(spec):
     with pytest.raises(InputError, match="pruner"):
         parse_pruner(spec)
+
+
+def test_the_page_on_problems_names_every_key_and_its_example_can_be_read(tmp_path):
+    page = (Path(__file__).parents[1] / "docs" / "problems.md").read_text()
+    tables = {
+        "problem": ProblemTable,
+        "spacecraft": SpacecraftTable,
+        "mission": MissionTable,
+        "catalogue": CatalogueTable,
+        "gtoc5": Gtoc5Rules,
+        "search": SearchSettings,
+    }
+    assert set(tables) == {field.name for field in msgspec.structs.fields(Config)}
+    for name, table in tables.items():
+        section = page.split(f"\n`[{name}]`")[1].split("\n`[")[0].split("\n## ")[0]
+        keys = {field.name for field in msgspec.structs.fields(table)}
+        documented = set(
+            re.findall(r"`(\w+)`", "".join(re.findall(r"^\| (`.*?) \| ", section, re.M)))
+        )
+        assert documented == keys, name
+    example = page.split("```toml\n")[1].split("```")[0]
+    assert read_config(_write(tmp_path, example)).mission.start_ids == (1, 4, 10)
