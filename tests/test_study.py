@@ -187,7 +187,7 @@ def test_table_6_stands_beside_ours(study):
 def test_the_margin_model_is_the_last_row_of_table_6_and_a_curve_of_figure_3(study):
     _, results, _ = study
     row = results["comparison"].tables[0].rows[-1]
-    assert row[:3] == ("Margin model", "ours", 80)
+    assert row[:3] == ("Margin model", "ours, 2 seeds", 80)
     # From 80 legs it knows more than chance: it starts from a physical estimate.
     assert float(row[3].split(" ± ")[0]) > 0.75
     sizes = [row[1] for row in results["data_size"].tables[0].rows if row[0] == "Margin model"]
@@ -423,6 +423,12 @@ def test_presets_ask_for_what_exists(preset):
     assert max(map(max, preset.data_size.values())) < preset.legs
     assert set(preset.margin_sizes) <= set(preset.data_size["dnn1"])
     assert set(preset.n_features) == set(paper_values.TABLE_4)
+
+
+def test_large_training_sets_are_drawn_less_often():
+    few = dataclasses.replace(TINY, large=80, large_seeds=1)
+    assert [len(few.seeds(3, samples)) for samples in (79, 80, 400)] == [3, 1, 1]
+    assert len(TINY.seeds(2, 10**6)) == 2
 
 
 def test_a_preset_file_changes_what_it_names(tmp_path):

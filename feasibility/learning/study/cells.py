@@ -34,6 +34,8 @@ class Cells:
     ----------
     computed, reused : int
         Cells computed and cells read from the folder since the start.
+    used_seconds : dict of Path to float
+        How long each cell asked for since the start took to compute, whenever that was.
     """
 
     def __init__(self, folder: Path, say: Callable[[str], None] = print) -> None:
@@ -45,6 +47,7 @@ class Cells:
         self.say = say
         self.computed = 0
         self.reused = 0
+        self.used_seconds: dict[Path, float] = {}
 
     def get(self, name: str, key: Key, compute: Callable[[], Any]) -> Any:
         """Return the cell's value, computing and saving it if it is not there yet.
@@ -69,7 +72,9 @@ class Cells:
         else:
             self._write(path, name, key, _timed(compute))
         # Read back, so that a first run sees exactly what a later one will see.
-        return self._read(path)["value"]
+        cell = self._read(path)
+        self.used_seconds[path] = float(cell["seconds"])
+        return cell["value"]
 
     def get_many(
         self,

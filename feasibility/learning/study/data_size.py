@@ -39,7 +39,7 @@ def run(context: Context) -> Result:
         for size in sizes:
             fits = [
                 balanced_fit(context, model, size, seed, paper_values.SELECTED_FEATURES)
-                for seed in range(preset.data_size_seeds)
+                for seed in preset.seeds(preset.data_size_seeds, size)
             ]
             samples = fits[0].feasible + fits[0].infeasible
             if samples not in curves[model]:

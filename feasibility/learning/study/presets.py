@@ -50,6 +50,8 @@ class Preset:
         Table 6: training size of each model.
     comparison_seeds : int
         Table 6: draws of the training set.
+    large, large_seeds : int
+        Fig. 3 and Table 6: training sets of this size and above get so many draws at most.
     n_features : tuple of int
         Table 4: numbers of features.
     n_features_rows, n_features_folds : int
@@ -85,6 +87,8 @@ class Preset:
     margin_sizes: tuple[int, ...]
     comparison: Mapping[str, int]
     comparison_seeds: int
+    large: int
+    large_seeds: int
     n_features: tuple[int, ...]
     n_features_rows: int
     n_features_folds: int
@@ -101,6 +105,10 @@ class Preset:
     ranking_seeds: int
     label_legs: int
     label_models: tuple[str, ...]
+
+    def seeds(self, wanted: int, samples: int) -> range:
+        """Return the seeds of a training set: `wanted` of them, fewer where it is large."""
+        return range(min(wanted, self.large_seeds) if samples >= self.large else wanted)
 
     def to_dict(self) -> dict[str, Any]:
         """Return every setting as plain data."""
@@ -125,6 +133,8 @@ _QUICK: Final = Preset(
     margin_sizes=(500, 2000),
     comparison=dict.fromkeys(MODELS, 2000),
     comparison_seeds=3,
+    large=400_000,
+    large_seeds=3,
     n_features=_TABLE_4_COUNTS,
     n_features_rows=1000,
     n_features_folds=2,
@@ -166,6 +176,8 @@ _LAPTOP: Final = Preset(
         "dnn2": 100_000,
     },
     comparison_seeds=3,
+    large=400_000,
+    large_seeds=1,
     n_features=_TABLE_4_COUNTS,
     n_features_rows=20_000,
     n_features_folds=3,
@@ -207,6 +219,8 @@ _PAPER: Final = Preset(
         "dnn2": 400_000,
     },
     comparison_seeds=5,
+    large=400_000,
+    large_seeds=5,
     n_features=_TABLE_4_COUNTS,
     n_features_rows=400_000,
     n_features_folds=5,

@@ -149,7 +149,7 @@ def _what_was_run(record: dict[str, Any]) -> str:
         (
             "time",
             f"{duration(data['preparation_s'])} for legs and features, {duration(total)} for the "
-            "experiments ("
+            "trainings and solves of the experiments, by the clock of one process each ("
             + ", ".join(f"{name} {duration(e['seconds'])}" for name, e in experiments.items())
             + ")",
         ),

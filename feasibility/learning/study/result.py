@@ -77,8 +77,8 @@ def _shown(value: Value) -> str:
 
 
 def spread(mean: float, deviation: float) -> str:
-    """Return ``mean ± deviation`` as the tables print it."""
-    return f"{mean:.4f} ± {deviation:.4f}"
+    """Return ``mean ± deviation`` as the tables print it, the mean alone where nothing spreads."""
+    return f"{mean:.4f} ± {deviation:.4f}" if deviation > 0 else f"{mean:.4f}"
 
 
 @final

@@ -156,18 +156,15 @@ def read_record(out: Path) -> dict[str, Any]:
 
 
 def _run_one(context: Context, name: str, record: dict[str, Any]) -> Result:
-    before, began = context.cells.computed, time.perf_counter()
+    before = set(context.cells.used_seconds)
     experiment = importlib.import_module(f"feasibility.learning.study.{name}")
     result: Result = experiment.run(context)
     # Read again: another process may have done other experiments in the same folder meanwhile.
     record["experiments"] = read_record(context.out)["experiments"]
-    known = record["experiments"].get(name, {"seconds": 0.0, "cells": 0})
-    computed = context.cells.computed - before
-    if computed or name not in record["experiments"]:
-        record["experiments"][name] = {
-            "seconds": known["seconds"] + time.perf_counter() - began,
-            "cells": known["cells"] + computed,
-        }
+    # What a cell took counts whenever it was computed, and for the first experiment that used it.
+    own = {p: s for p, s in context.cells.used_seconds.items() if p not in before}
+    if own or name not in record["experiments"]:
+        record["experiments"][name] = {"seconds": sum(own.values()), "cells": len(own)}
     _write_record(context.out, record)
     return result
 
