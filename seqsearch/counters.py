@@ -25,6 +25,8 @@ class RankCounters:
         Candidates kept because the predictor knows nothing of them.
     pruned : dict of str to int
         Legs dropped by each pruner, in the order in which they were asked.
+    out_of_domain : int
+        Candidates that survive because a classifier does not know such legs.
     optimised : int
         Legs that went to the leg solver.
     feasible : int
@@ -46,6 +48,7 @@ class RankCounters:
     questions: int = 0
     unknown: int = 0
     pruned: dict[str, int] = field(default_factory=dict)
+    out_of_domain: int = 0
     optimised: int = 0
     feasible: int = 0
     kept: int = 0

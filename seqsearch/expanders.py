@@ -307,9 +307,14 @@ def keep_hops(
 ) -> NDArray[np.bool_]:
     """Return (n,) bool, where all stages survive; each stage is asked about survivors only."""
     mask = np.ones(len(hops), dtype=np.bool_)
+    unknown = np.zeros(len(hops), dtype=np.bool_)
     for legs in hops.stages:
         rows = np.flatnonzero(mask)
-        mask[rows], pruned = pruner.keep_with_counts(legs.take(rows))
+        answer = pruner.survivors(legs.take(rows))
+        mask[rows] = answer.mask
+        unknown[rows] |= answer.unknown
         if counters is not None:
-            counters.count_pruned(pruned)
+            counters.count_pruned(answer.pruned)
+    if counters is not None:
+        counters.out_of_domain += int(np.count_nonzero(unknown & mask))
     return mask

@@ -3,10 +3,15 @@
 import numpy as np
 import pytest
 
+from feasibility import AllOf, ClassifierPruner, FeasibilityClassifier, Legs
 from feasibility.orbits import OrbitalNeighbours, orbital_metric
+from seqsearch.counters import RankCounters
+from seqsearch.expanders import keep_hops
 from seqsearch.expansion import expand, reached
 from seqsearch.nodes import Nodes
 from seqsearch.starts import dense_starts
+from seqsearch.tour_problem import Hops
+from tests.labelled import labelled_dataset
 from tests.problems import small_problem, small_settings
 
 
@@ -116,3 +121,17 @@ def test_starts_are_limited_to_the_given_ids():
         problem, OrbitalNeighbours(problem.catalogue), small_settings(), np.random.default_rng(0)
     )
     assert set(rows) == {3, 50}
+
+
+def test_hops_that_a_classifier_keeps_for_not_knowing_them_are_counted_once():
+    legs = labelled_dataset(40, seed=2).legs
+    # Half of the hops have an engine that no model has seen, in the first of two stages.
+    isp = np.where(np.arange(40) < 20, 19_000.0, legs.isp)
+    strange = Legs(legs.rv_dep, legs.rv_arr, legs.tof_days, legs.m0, legs.thrust, isp, 0.0)
+    hops = Hops((strange, legs), (np.zeros(40), np.zeros(40)))
+    pruner = AllOf(ClassifierPruner(FeasibilityClassifier.load("default")))
+    counters = RankCounters(pass_number=1, rank=1)
+    kept = keep_hops(pruner, hops, counters)
+    assert 0 < kept[:20].sum() < 20
+    assert counters.out_of_domain == kept[:20].sum()
+    assert counters.pruned == {"classifier": 40 - kept.sum()}

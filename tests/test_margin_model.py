@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 
 from feasibility import (
+    AllOf,
     ClassifierPruner,
     FeasibilityClassifier,
     InputError,
+    KeepAll,
     Legs,
     check_pruner,
     optimise,
@@ -119,12 +121,13 @@ def test_probabilities_are_never_nan_and_the_unknown_is_kept(default, legs):
     for strange in (unbound, odd):
         assert not default.in_domain(strange).any()
         assert ClassifierPruner(default).keep(strange).all()
-        pruner = ClassifierPruner(default)
-        likely = default.feasible_probability(strange) >= pruner.threshold
-        np.testing.assert_array_equal(pruner.keep_with_unknown(strange)[1], ~likely)
-    # Among legs that are known none is kept for being unknown.
-    kept, unknown = pruner.keep_with_unknown(legs)
-    assert not (unknown & default.in_domain(legs)).any()
+        assert ClassifierPruner(default).keep_with_unknown(strange)[1].all()
+        found = AllOf(KeepAll(), AllOf(ClassifierPruner(default))).survivors(strange)
+        assert found.unknown.all()
+        assert set(found.pruned.values()) == {0}
+    kept, unknown = ClassifierPruner(default).keep_with_unknown(legs)
+    np.testing.assert_array_equal(unknown, ~default.in_domain(legs))
+    assert (kept | ~unknown).all()
     assert (~kept).any()
     assert default.in_domain(legs).mean() > 0.99
 

@@ -8,7 +8,28 @@ from numpy.typing import NDArray
 
 from feasibility.legs import Legs
 from feasibility.pruners.asking import ask
+from feasibility.pruners.classifier import ClassifierPruner
 from feasibility.pruners.protocol import Pruner
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Survivors:
+    """What several pruners say of n legs.
+
+    Attributes
+    ----------
+    mask : (n,) bool
+        True where the leg survives all pruners.
+    unknown : (n,) bool
+        True where it does, and a classifier kept it for not knowing it.
+    pruned : dict of str to int
+        How many legs each pruner dropped, as `AllOf.keep_with_counts` has it.
+    """
+
+    mask: NDArray[np.bool_]
+    unknown: NDArray[np.bool_]
+    pruned: dict[str, int]
 
 
 @final
@@ -42,7 +63,12 @@ class AllOf:
 
     def keep(self, legs: Legs, /) -> NDArray[np.bool_]:
         """Return (n,) bool, True where the leg survives all pruners."""
-        return self.keep_with_counts(legs)[0]
+        return self.survivors(legs).mask
+
+    def keep_with_unknown(self, legs: Legs, /) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Return the masks of `survivors`; compare `ClassifierPruner.keep_with_unknown`."""
+        found = self.survivors(legs)
+        return found.mask, found.unknown
 
     def keep_with_counts(self, legs: Legs, /) -> tuple[NDArray[np.bool_], dict[str, int]]:
         """Return the mask of `keep` and how many legs each pruner dropped.
@@ -59,14 +85,30 @@ class AllOf:
         PrunerContractError
             A pruner raised, or returned something else than a boolean a leg.
         """
+        found = self.survivors(legs)
+        return found.mask, found.pruned
+
+    def survivors(self, legs: Legs, /) -> Survivors:
+        """Return what survives, what of it is not known, and who dropped how many, at once.
+
+        Raises
+        ------
+        PrunerContractError
+            As for `keep_with_counts`.
+        """
         mask = np.ones(len(legs), dtype=np.bool_)
+        unknown = np.zeros(len(legs), dtype=np.bool_)
         pruned: dict[str, int] = {}
         for pruner in self.pruners:
             rows = np.flatnonzero(mask)
-            kept = ask(pruner, legs.take(rows))
+            if isinstance(pruner, AllOf | ClassifierPruner):
+                kept, in_the_dark = pruner.keep_with_unknown(legs.take(rows))
+                unknown[rows] |= in_the_dark
+            else:
+                kept = ask(pruner, legs.take(rows))
             mask[rows] = kept
             pruned[_unused(pruner_name(pruner), pruned)] = len(rows) - int(np.count_nonzero(kept))
-        return mask, pruned
+        return Survivors(mask, unknown & mask, pruned)
 
 
 def pruner_name(pruner: Pruner) -> str:

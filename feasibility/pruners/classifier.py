@@ -55,7 +55,7 @@ class ClassifierPruner:
         return self.keep_with_unknown(legs)[0]
 
     def keep_with_unknown(self, legs: Legs, /) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-        """Return the mask of `keep` and which legs are kept only because they are not known.
+        """Return the mask of `keep` and which legs are kept because they are not known.
 
         Row-wise and pure as `keep` is: who counts the second mask keeps the count.
 
@@ -64,9 +64,7 @@ class ClassifierPruner:
         mask : (n,) bool
             True where the leg survives.
         unknown : (n,) bool
-            True where it survives for being outside the domain, though its probability is below
-            the threshold.
+            True where it is outside the classifier's domain, and so survives in any case.
         """
         probability, inside = self.classifier.assess(legs)
-        likely = probability >= self.threshold
-        return likely | ~inside, ~likely & ~inside
+        return (probability >= self.threshold) | ~inside, ~inside
