@@ -19,6 +19,16 @@ _LEAST_BATCH, _LARGEST_BATCH = 32, 1024
 _BATCHES_OF_AN_EPOCH: Final = 16
 _STEPS: Final = 8000
 _FEWEST_EPOCHS, _MOST_EPOCHS = 12, 60
+_SETTINGS: Final = (
+    "layers",
+    "width",
+    "epochs",
+    "batch",
+    "learning_rate",
+    "patience",
+    "seed",
+)
+"""What a cell depends on, and not where it is computed."""
 
 
 def margin_recipe(context: Context, legs: int, seed: int) -> MarginRecipe:
@@ -53,10 +63,7 @@ def run_margin(context: Context, samples: int, seed: int) -> Outcome:
     """
     per_class = min(samples // 2, context.data.smaller_class)
     recipe = margin_recipe(context, 2 * per_class, seed)
-    settings = asdict(recipe)
-    # Where it is computed is no part of what is computed.
-    for name in ("threads", "device"):
-        del settings[name]
+    settings = {name: getattr(recipe, name) for name in _SETTINGS}
     key = context.cell_key(kind=MARGIN, legs=per_class, recipe=settings, features=FEATURE_SET)
     value = context.cells.get(
         f"{MARGIN}-{per_class}+{per_class}-seed{seed}",
