@@ -12,6 +12,7 @@ from feasibility.orbits import Catalogue
 from feasibility.orbits.lambert import lambert
 from feasibility.sims_flanagan import solve_max_initial_mass
 from seqsearch import Problem, SearchSettings, search, verify_tour
+from seqsearch.cli import main
 from seqsearch.config import build_problem, read_config, to_toml, with_catalogue
 from seqsearch.gtoc5.directions import even_directions
 from seqsearch.gtoc5.element_distance import phase_free_points
@@ -408,3 +409,52 @@ def test_problems_that_cannot_score_are_refused():
     clash = Catalogue([0, 1, 2], bodies.names, 8000.0, bodies.elements, "clash")
     with pytest.raises(InputError, match="clash has a body with id 0"):
         toy_problem(catalogue=clash)
+
+
+TOY = """
+[problem]
+name = "toy"
+[spacecraft]
+wet_mass_kg = 1200
+dry_mass_kg = 500
+thrust_n = 0.3
+isp_s = 3000
+[mission]
+first_departure_mjd = [59000, 60000]
+max_duration_days = 900
+[gtoc5]
+[catalogue]
+file = "bodies.txt"
+[search]
+pruner = "default:0.99"
+beam_width = 3
+start_epochs = 2
+neighbours = 30
+tof_days_max = 400
+audit_per_rank = 4
+"""
+
+
+def _write_table(catalogue, path):
+    """Write bodies in the layout of GTOC5's table: argument of perihelion before node."""
+    lines = ["#Epoch a e i w Node M Object", "#(TDB) (AU) (deg) (deg) (deg) (deg) (deg)"]
+    for name, (a, e, *angles) in zip(catalogue.names, catalogue.elements, strict=True):
+        i, node, argp, anomaly = np.degrees(angles)
+        numbers = (59544.0, a / AU, e, i, argp, node, anomaly)
+        lines.append(" ".join(f"{number:.15g}" for number in numbers) + f" {name}")
+    path.write_text("\n".join(lines) + "\n")
+
+
+def test_a_run_on_the_command_line_verifies_and_resumes_to_the_same_tour(tmp_path, capsys):
+    _write_table(near_earth_bodies(), tmp_path / "bodies.txt")
+    problem, out = tmp_path / "toy.toml", tmp_path / "run"
+    problem.write_text(TOY)
+    arguments = ["run", str(problem), "--out", str(out), "--workers", "1"]
+    assert main(arguments) == 0
+    assert "best score 2.0, 2 asteroids" in capsys.readouterr().out
+    whole = (out / "sequence.json").read_bytes()
+    assert main(["verify", str(out), "--catalogue", str(tmp_path / "bodies.txt")]) == 0
+    assert "speed of fly-bys" in capsys.readouterr().out
+    assert main(["plot", str(out), "--out", str(tmp_path / "tour.svg")]) == 0
+    assert main(["resume", str(out), "--from-rank", "1:1", "--workers", "1"]) == 0
+    assert (out / "sequence.json").read_bytes() == whole
