@@ -3,11 +3,13 @@
 Run from the repository: python benchmarks/pruner.py [--legs N] [--threads 2]
 
 The candidates are those of the protocol "search" in a synthetic main belt. Each
-pruner gets them as legs, so its time is with features and everything; the
-kernels and BLAS release the lock, so the batch is split over threads.
-pykep's mima2, one leg at a time on a few of them and on one core, is given
-its Lambert arc, so its time is without that. Times are by the wall clock: other work on the
-same cores makes all of them longer.
+pruner gets them as legs, so its time is with features and everything. The classifier
+shares its work out to threads itself; for the others the batch is split over threads, as their
+kernels release the lock. pykep's mima2_from_hop, on a few of the legs, is given one leg at a
+time; so is the network of the package neural_lowthrust, where that is installed.
+
+Legs per second are by the wall clock, so that other work on the same cores makes them fewer;
+the processor time of a leg hardly depends on that, and the ratios are of processor times.
 """
 
 import argparse
@@ -26,6 +28,7 @@ from feasibility import Legs, Pruner
 from feasibility.classifier import FeasibilityClassifier
 from feasibility.constants import MU_SUN
 from feasibility.dataset import read_protocol
+from feasibility.learning.peers import NEURAL, known_peers
 from feasibility.orbits import synthetic_main_belt
 from feasibility.pruners import LambertPruner, Mima2Pruner, MimaPruner
 from feasibility.pruners.classifier import ClassifierPruner
@@ -42,46 +45,47 @@ def candidates(n: int) -> Legs:
     return protocol.sampler.draw(n, rng, catalogue, protocol.craft(), protocol.impulsive_grid).legs
 
 
-def seconds(call: Callable[[], object]) -> float:
+def seconds(call: Callable[[], object], repeats: int = REPEATS) -> tuple[float, float]:
+    """Return the least wall-clock and the least processor time of a call."""
     call()
-    best = np.inf
-    for _ in range(REPEATS):
-        start = time.perf_counter()
+    wall, processor = [], []
+    for _ in range(repeats):
+        clock, own = time.perf_counter(), time.process_time()
         call()
-        best = min(best, time.perf_counter() - start)
-    return best
+        wall.append(time.perf_counter() - clock)
+        processor.append(time.process_time() - own)
+    return min(wall), min(processor)
 
 
-def rate(pruner: Pruner, legs: Legs, threads: int) -> tuple[float, float]:
-    """Return legs per second and the share kept."""
+def split_calls(pruner: Pruner, legs: Legs, threads: int) -> Callable[[], object]:
+    """Return a call of the pruner on parts of the batch, one a thread."""
     parts = [legs.take(rows) for rows in np.array_split(np.arange(len(legs)), threads)]
-    with ThreadPoolExecutor(threads) as pool:
-        kept = np.concatenate(list(pool.map(pruner.keep, parts)))
-        elapsed = seconds(lambda: list(pool.map(pruner.keep, parts)))
-    return len(legs) / elapsed, float(kept.mean())
+
+    def call() -> object:
+        with ThreadPoolExecutor(threads) as pool:
+            return list(pool.map(pruner.keep, parts))
+
+    return call
 
 
-def pykep_mima2_rate(legs: Legs) -> float:
-    """Return legs per second of pykep's mima2_from_hop on one core."""
+def pykep_mima2(legs: Legs) -> Callable[[], object]:
+    """Return a call of pykep's mima2_from_hop on every leg."""
     pykep = load_pykep()
-    n = min(SINGLE_CALLS, len(legs))
-    problems = []
-    for i in range(n):
-        lambert = pykep.lambert_problem(
-            legs.rv_dep[i, :3], legs.rv_arr[i, :3], legs.tof_s[i], MU_SUN, False, 0
-        )
-        v1, v2 = np.array(lambert.v0[0]), np.array(lambert.v1[0])
-        state = [legs.rv_dep[i, :3].tolist(), v1.tolist()]
-        impulses = [(v1 - legs.rv_dep[i, 3:]).tolist(), (legs.rv_arr[i, 3:] - v2).tolist()]
-        problems.append(
-            (state, *impulses, legs.tof_s[i], legs.thrust[i], legs.exhaust_velocity[i])
-        )
+    begin = pykep.epoch(0.0)
+    hops = []
+    for i in range(len(legs)):
+        end = pykep.epoch(legs.tof_days[i])
+        bodies = [
+            pykep.planet(pykep.udpla.keplerian(epoch, [state[:3], state[3:]], MU_SUN))
+            for epoch, state in ((begin, legs.rv_dep[i]), (end, legs.rv_arr[i]))
+        ]
+        hops.append((*bodies, begin, end, legs.thrust[i], legs.exhaust_velocity[i]))
 
     def call() -> None:
-        for problem in problems:
-            pykep.mima2(*problem, MU_SUN)
+        for hop in hops:
+            pykep.mima2_from_hop(*hop)
 
-    return n / seconds(call)
+    return call
 
 
 def main() -> None:
@@ -91,20 +95,40 @@ def main() -> None:
     parser.add_argument("--model", default="default", help="model file (default: the package's)")
     options = parser.parse_args()
     legs = candidates(options.legs)
+    few = legs.take(np.arange(min(SINGLE_CALLS, len(legs))))
     classifier = FeasibilityClassifier.load(options.model)
-    pruners: dict[str, Pruner] = {
-        "classifier, recall 0.99": ClassifierPruner(classifier, recall=0.99),
-        "lambert": LambertPruner(),
-        "mima": MimaPruner(),
-        "mima2": Mima2Pruner(),
-    }
-    print(f"{len(legs)} candidates, {options.threads} threads")
-    for name, pruner in pruners.items():
-        per_second, kept = rate(pruner, legs, options.threads)
-        print(f"{name:<26} {per_second:>10.0f} legs/s   keeps {kept:.3f}")
-    print(f"{'pykep mima2 (1 core)':<26} {pykep_mima2_rate(legs):>10.0f} legs/s")
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-    print(f"peak memory {peak:.0f} MB")
+    pruner = ClassifierPruner(classifier, recall=0.99, threads=options.threads)
+    print(
+        f"{len(legs)} candidates, {options.threads} threads; the classifier keeps "
+        f"{pruner.keep(legs).mean():.3f} of them"
+    )
+    print(f"{'':<26} {'legs/s':>10} {'us a leg':>10}")
+    calls = {"classifier, recall 0.99": (lambda: pruner.keep(legs), legs)}
+    for name, other in (
+        ("lambert", LambertPruner()),
+        ("mima", MimaPruner()),
+        ("mima2", Mima2Pruner()),
+    ):
+        calls[name] = split_calls(other, legs, options.threads), legs
+    calls["pykep mima2_from_hop"] = pykep_mima2(few), few
+    peers, missing = known_peers()
+    for peer in peers:
+        if peer.name == NEURAL:
+            calls[NEURAL] = (lambda score=peer.score: score(few)), few
+    used = {}
+    for name, (call, asked) in calls.items():
+        wall, processor = seconds(call)
+        used[name] = processor / len(asked)
+        print(f"{name:<26} {len(asked) / wall:>10.0f} {1e6 * used[name]:>10.2f}", flush=True)
+        if name == "classifier, recall 0.99":
+            peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+            print(f"  peak memory so far {peak:.0f} MB")
+    own = used["classifier, recall 0.99"]
+    for name in ("pykep mima2_from_hop", NEURAL):
+        if name in used:
+            print(f"the classifier is {used[name] / own:.0f} times as fast as {name}")
+    if missing:
+        print(missing)
 
 
 if __name__ == "__main__":

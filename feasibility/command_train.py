@@ -2,6 +2,7 @@
 
 import argparse
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -18,15 +19,18 @@ writes a checkpoint after each epoch beside the model; run the command again to
 go on after an interruption.
 
 The model "margin" learns the maximum initial mass instead, for any spacecraft, from one or
-more datasets; the learning curve is drawn beside it.
+more datasets; the learning curve is drawn beside it. "final-mass" adds to such a model, given by
+--start, the mass at arrival with least propellant; the rest of the model stays as it is. Its
+datasets have propellant = true in their protocol.
 
   feasibility train data/search data/table1 data/general --model margin --out any.seqmodel
+  feasibility train data/flown --model final-mass --start any.seqmodel --out whole.seqmodel
   feasibility train data/table1 --preset dnn1 --out dnn1.seqmodel
   feasibility train data/table1 --model ensemble --balance adasyn
   seqsearch run gtoc7 --pruner dnn1.seqmodel:0.99
 """
 
-_MODELS: Final = ("margin", "dnn", "ensemble", "knn", "svm", "tree")
+_MODELS: Final = ("margin", "final-mass", "dnn", "ensemble", "knn", "svm", "tree")
 _DEFAULT_FEATURES: Final = 60
 
 
@@ -39,7 +43,10 @@ def add_parser(commands: Any) -> None:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument(
-        "dataset", nargs="+", metavar="DATASET", help="folder of a dataset; several for margin"
+        "dataset",
+        nargs="+",
+        metavar="DATASET",
+        help="folder of a dataset; several for margin and final-mass",
     )
     parser.add_argument("--model", choices=_MODELS, help="kind of model (default: dnn)")
     parser.add_argument(
@@ -71,6 +78,9 @@ def add_parser(commands: Any) -> None:
         metavar="NAME=VALUE",
         help="any other hyperparameter, such as width=200; may be given several times",
     )
+    parser.add_argument(
+        "--start", metavar="FILE", help='margin model that final-mass is added to, or "default"'
+    )
     parser.add_argument("--seed", type=int, default=0, help="seed of everything (default: 0)")
     parser.add_argument(
         "--out", metavar="FILE", help="the model (default: MODEL.seqmodel, or PRESET.seqmodel)"
@@ -94,10 +104,16 @@ def run(options: argparse.Namespace) -> int:
     out = Path(options.out or f"{name}.seqmodel")
     if not out.parent.is_dir():
         raise InputError(f"--out {out}: no folder {out.parent}")
+    if (name == "final-mass") != (options.start is not None):
+        raise InputError("--start: goes with --model final-mass, which needs it")
     if name == "margin":
         return _train_margin(options, out)
+    if name == "final-mass":
+        return _train_final_mass(options, out)
     if len(options.dataset) > 1:
-        raise InputError(f"{len(options.dataset)} datasets: only --model margin takes several")
+        raise InputError(
+            f"{len(options.dataset)} datasets: only --model margin and final-mass take several"
+        )
     return _train(options, name, out)
 
 
@@ -106,13 +122,7 @@ def _train_margin(options: argparse.Namespace, out: Path) -> int:
     from feasibility.learning.margin.curves import draw_learning_curve
     from feasibility.learning.margin.train import MarginRecipe, train_margin
 
-    for name in ("preset", "features"):
-        if getattr(options, name) is not None:
-            raise InputError(f"--{name}: is not for --model margin")
-    if options.balance != "none":
-        raise InputError("--balance: is not for --model margin, which learns masses, not classes")
-    settings = _hyperparameters(options, network=True)
-    settings.pop("keep_best", None)
+    settings = _margin_settings(options)
     try:
         recipe = MarginRecipe(**settings, seed=options.seed)
     except TypeError as error:
@@ -142,6 +152,56 @@ def _train_margin(options: argparse.Namespace, out: Path) -> int:
     )
     print(f"wrote {out} and {curve}")
     return 0
+
+
+def _train_final_mass(options: argparse.Namespace, out: Path) -> int:
+    from feasibility.classifier import FeasibilityClassifier
+    from feasibility.dataset import read_dataset
+    from feasibility.learning.margin.train_final_mass import FINAL_MASS_RECIPE, train_final_mass
+
+    settings = _margin_settings(options)
+    try:
+        recipe = replace(FINAL_MASS_RECIPE, **settings, seed=options.seed)
+    except TypeError as error:
+        raise InputError(f"--set: {error}") from None
+    checkpoint = out.with_name(out.name + ".checkpoint")
+    artefact = train_final_mass(
+        FeasibilityClassifier.load(options.start).artefact,
+        [read_dataset(folder) for folder in options.dataset],
+        recipe,
+        checkpoint=checkpoint,
+        on_epoch=_print_margin_epoch,
+    )
+    artefact.save(out)
+    checkpoint.unlink(missing_ok=True)
+    measures = artefact.metrics["final_mass"]
+    print(
+        f"{measures['legs']} legs for training; validation legs: relative error of the final "
+        f"mass, median {measures['median_relative_error']:.5f}, "
+        f"mean {measures['mean_relative_error']:.5f}"
+    )
+    print(f"wrote {out}")
+    return 0
+
+
+def _margin_settings(options: argparse.Namespace) -> dict[str, Any]:
+    """Return what the options set for a net of a margin model.
+
+    Raises
+    ------
+    InputError
+        An option of the other models.
+    """
+    for name in ("preset", "features"):
+        if getattr(options, name) is not None:
+            raise InputError(f"--{name}: is not for --model {options.model}")
+    if options.balance != "none":
+        raise InputError(
+            f"--balance: is not for --model {options.model}, which learns masses, not classes"
+        )
+    settings = _hyperparameters(options, network=True)
+    settings.pop("keep_best", None)
+    return settings
 
 
 def _print_margin_epoch(epoch: Any) -> None:

@@ -28,7 +28,21 @@ def kernel(function: _F) -> _F:
 
     The kernel works on bare arrays and numbers; it validates nothing.
     """
-    compiled: Any = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
+    return _compiled(function, fastmath=False)
+
+
+def summing_kernel(function: _F) -> _F:
+    """Compile a kernel in which sums may be taken in another order, and so as vectors.
+
+    The order is fixed when it is compiled: the same input has the same result.
+    """
+    return _compiled(function, fastmath={"reassoc", "contract", "nsz"})
+
+
+def _compiled(function: _F, fastmath: bool | set[str]) -> _F:
+    compiled: Any = numba.njit(
+        cache=True, nogil=True, error_model="numpy", fastmath=fastmath
+    )(function)
     # Private names of numba, so absence must do no harm; test_kernel_cache would tell.
     index: Any = getattr(getattr(compiled, "_cache", None), "_cache_file", None)
     if index is not None and hasattr(index, "_source_stamp"):

@@ -122,6 +122,19 @@ class _Call:
             self.inner.cancel()
 
 
+def own_threads() -> int:
+    """Return how many threads a computation of this process may use.
+
+    One for each processor that the process may run on, but one alone in a worker process,
+    whose siblings use the others.
+    """
+    if multiprocessing.parent_process() is not None:
+        return 1
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
 @contextmanager
 def worker_pool(workers: int) -> Iterator[MendingPool | None]:
     """Yield a process pool whose workers leave Ctrl-C to this process; None for one worker.

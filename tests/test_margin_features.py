@@ -19,7 +19,13 @@ from feasibility.learning.margin.features import (
     margin_features,
     quick_features,
 )
-from feasibility.learning.margin.path_kernels import balanced_impulse, gauss_row, spent_segments
+from feasibility.learning.margin.path_kernels import (
+    N_NODES,
+    balanced_impulse,
+    impulse_effects,
+    sine_cosine,
+    spent_segments,
+)
 from feasibility.orbits import synthetic_main_belt
 from feasibility.sims_flanagan.fast import fast_max_initial_mass
 from feasibility.sims_flanagan.fast_element_kernels import from_elements, to_elements
@@ -113,19 +119,35 @@ def test_the_unit_of_acceleration_is_that_of_the_departure_orbit():
     np.testing.assert_allclose(log_acceleration(leg, leg.m0), expected, rtol=1e-12)
 
 
+@given(x=st.floats(-1e4, 1e4))
+def test_sines_and_cosines_by_arithmetic_alone(x):
+    np.testing.assert_allclose(sine_cosine(x), (np.sin(x), np.cos(x)), atol=1e-12)
+
+
+@given(quarter=st.integers(-20, 20), beside=st.floats(-1e-3, 1e-3))
+def test_sines_and_cosines_beside_right_angles(quarter, beside):
+    for x in (0.5 * np.pi * quarter + beside, 0.5 * np.pi * (quarter + 0.5) + beside):
+        np.testing.assert_allclose(sine_cosine(x), (np.sin(x), np.cos(x)), atol=1e-13)
+
+
 @given(seed=seeds)
 def test_gauss_rows_are_what_a_small_impulse_does(seed):
     rng = np.random.default_rng(seed)
     x = np.array([rng.uniform(0.4, 2.5), *rng.uniform(-0.5, 0.5, 4), rng.uniform(-3, 3)])
-    state, row, plus, minus = np.empty(6), np.empty((1, 13)), np.empty(6), np.empty(6)
+    state, plus, minus = np.empty(6), np.empty(6), np.empty(6)
     from_elements(x, state)
-    remaining = rng.uniform(0.0, 5.0)
-    assert gauss_row(x.reshape(1, 6), 0, x[5], remaining, row)
+    # The leg's orbit at one of seven nodes, among other ones.
+    path, rows, anomaly = np.zeros((6, N_NODES)), np.zeros(13 * N_NODES), np.zeros(6 * N_NODES)
+    path[:, :7] = np.array([1.0, 0.1, 0.1, 0.1, 0.1, 2.0])[:, None]
+    node, remaining = rng.integers(7), rng.uniform(0.0, 5.0)
+    path[:, node], anomaly[node] = x, remaining
+    assert impulse_effects(path.reshape(-1), 7, rows, anomaly)
+    row = rows.reshape(13, N_NODES)[:, node]
     r, v = state[:3], state[3:]
     radial = r / np.linalg.norm(r)
     normal = np.cross(r, v) / np.linalg.norm(np.cross(r, v))
     axes = (radial, np.cross(normal, radial), normal)
-    n_r, n_t, ex_r, ex_t, ex_n, ey_r, ey_t, ey_n, h_n, k_n, l_r, l_t, l_n = row[0]
+    n_r, n_t, ex_r, ex_t, ex_n, ey_r, ey_t, ey_n, h_n, k_n, l_r, l_t, l_n = row
     written = ((n_r, ex_r, ey_r, 0, 0, l_r), (n_t, ex_t, ey_t, 0, 0, l_t),
                (0, ex_n, ey_n, h_n, k_n, l_n))  # fmt: skip
     for axis, effect in zip(axes, written, strict=True):
@@ -140,13 +162,13 @@ def test_gauss_rows_are_what_a_small_impulse_does(seed):
 @given(seed=seeds, spent=st.floats(1e-4, 0.8))
 def test_the_lighter_spacecraft_gives_larger_impulses(seed, spent):
     nodes = 20
-    g = np.random.default_rng(seed).uniform(0.1, 2.0, (nodes, 4))
+    g = np.random.default_rng(seed).uniform(0.1, 2.0, (4, N_NODES))
     exhaust = 1.3
     z = spent * exhaust / nodes
     shares = np.array([1 - z * spent_segments(i, nodes) / exhaust for i in range(nodes)])
-    value = z * np.sum(g[:, 3] / shares)
+    value = z * np.sum(g[3, :nodes] / shares)
     c = np.empty(nodes)
-    assert balanced_impulse(value, g, exhaust, nodes, c) == pytest.approx(z, rel=1e-3)
+    assert balanced_impulse(value, g.reshape(-1), exhaust, nodes, c) == pytest.approx(z, rel=1e-3)
 
 
 @pytest.mark.parametrize(("protocol", "typical"), [("search", 0.03), ("table1", 0.02)])

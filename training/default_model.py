@@ -6,6 +6,12 @@ interrupted, and --share makes a smaller model of the same kind:
 
     python training/default_model.py --out data/default [--share 0.1] [--workers 2]
 
+1. Legs with m* of all families: `FAMILIES`; the margin nets learn from them.
+2. With --hard-rounds N, N times: legs that the last model is most unsure of among several
+   times as many (`HARD`), and a training with them too. Not part of the default model, as
+   docs/classifier.md says why.
+3. Legs with minimum propellant: `PROPELLANT`; the net for the final mass learns from them.
+
 The families are those of docs/classifier.md. Seeds of training and test differ, and test legs
 have the natural mix of their protocol, without draws at the boundary.
 """
@@ -20,9 +26,12 @@ from feasibility.cli import main as feasibility
 from feasibility.dataset import read_protocol
 from feasibility.dataset.generate import begin
 from feasibility.dataset.protocol import Protocol, SpacecraftTable
+from feasibility.learning.margin.hard_examples import harder
 from feasibility.workers import worker_pool
 
 TRAINING_SEED, TEST_SEED = 11, 7001
+PROPELLANT_SEED, PROPELLANT_TEST_SEED = 12, 7002
+HARD_SEED = 101
 LEGS_PER_SHARD = 1000
 # Family: (legs for training, legs for the test).
 FAMILIES = {
@@ -37,6 +46,18 @@ FAMILIES = {
     "craft3900": (8_000, 3_000),
     "craft5000": (8_000, 0),
 }
+# Family: legs, of which about a third can be flown and carry a final mass.
+PROPELLANT = {
+    "search": (40_000, 6_000),
+    "table1": (12_000, 1_500),
+    "nea": (12_000, 1_500),
+    "general": (16_000, 1_500),
+    "craft2100": (2_000, 0),
+    "craft3900": (2_000, 0),
+}
+# Family: legs of a round of hard examples, the most doubtful of HARD_FACTOR times as many.
+HARD = {"search": 12_000, "table1": 9_000, "nea": 14_000}
+HARD_FACTOR = 5
 NEAR_EARTH = {"nea": "limited", "neaall": "table1"}
 
 
@@ -65,6 +86,19 @@ def generate(made: Protocol, legs: int, folder: Path, seed: int, workers: int) -
         generation.run(pool, in_flight=2 * workers)
 
 
+def with_propellant(made: Protocol) -> Protocol:
+    """Return the protocol with minimum propellant, and no dry mass to limit it."""
+    craft = made.spacecraft
+    if craft is not None:
+        craft = msgspec.structs.replace(craft, dry_mass_kg=0.0)
+    return msgspec.structs.replace(made, propellant=True, spacecraft=craft)
+
+
+def natural(made: Protocol) -> Protocol:
+    """Return the protocol without draws at the boundary."""
+    return msgspec.structs.replace(made, boundary_share=0.0)
+
+
 def main() -> int:
     """Do everything and return the exit code."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -72,26 +106,45 @@ def main() -> int:
     parser.add_argument("--share", type=float, default=1.0, help="of the legs (default 1)")
     parser.add_argument("--workers", type=int, default=2, help="processes (default 2)")
     parser.add_argument("--epochs", default="34", help="of the training (default 34)")
+    parser.add_argument("--hard-rounds", type=int, default=0, help="of hard examples (default 0)")
     parser.add_argument("--shared", type=Path, default=Path("../shared"), help="data folder")
     options = parser.parse_args()
     tables = options.shared / "gtoc" / "official"
+
+    def dataset(part: str, family: str, made: Protocol, legs: int, seed: int) -> str:
+        folder = options.out / part / family
+        generate(made, int(legs * options.share), folder, seed, options.workers)
+        return str(folder)
+
+    def train(folders: list[str], name: str) -> Path:
+        model = options.out / f"{name}.seqmodel"
+        recipe = ["--model", "margin", "--epochs", options.epochs, "--seed", "1"]
+        if not model.exists() and feasibility(["train", *folders, *recipe, "--out", str(model)]):
+            raise SystemExit(1)
+        return model
+
     learned, test = [], []
-    for family, counts in FAMILIES.items():
+    for family, (legs, test_legs) in FAMILIES.items():
         made = protocol(family, tables)
-        for legs, seed, part, folders in (
-            (counts[0], TRAINING_SEED, "train", learned),
-            (counts[1], TEST_SEED, "test", test),
-        ):
-            if not legs:
-                continue
-            if part == "test":
-                made = msgspec.structs.replace(made, boundary_share=0.0)
-            folder = options.out / part / family
-            generate(made, int(legs * options.share), folder, seed, options.workers)
-            folders.append(str(folder))
-    model = str(options.out / "default.seqmodel")
-    recipe = ["--model", "margin", "--epochs", options.epochs, "--seed", "1", "--out", model]
-    return feasibility(["train", *learned, *recipe]) or feasibility(["evaluate", model, *test])
+        learned.append(dataset("train", family, made, legs, TRAINING_SEED))
+        if test_legs:
+            test.append(dataset("test", family, natural(made), test_legs, TEST_SEED))
+    model = train(learned, "margin")
+    for round_ in range(1, options.hard_rounds + 1):
+        for family, legs in HARD.items():
+            made = harder(protocol(family, tables), model, HARD_FACTOR)
+            learned.append(dataset(f"hard{round_}", family, made, legs, HARD_SEED + round_))
+        model = train(learned, f"margin-hard{round_}")
+    flown = []
+    for family, (legs, test_legs) in PROPELLANT.items():
+        made = with_propellant(protocol(family, tables))
+        flown.append(dataset("propellant", family, made, legs, PROPELLANT_SEED))
+        if test_legs:
+            made = natural(made)
+            test.append(dataset("test-propellant", family, made, test_legs, PROPELLANT_TEST_SEED))
+    whole = str(options.out / "default.seqmodel")
+    final_mass = ["train", *flown, "--model", "final-mass", "--start", str(model), "--seed", "1"]
+    return feasibility([*final_mass, "--out", whole]) or feasibility(["evaluate", whole, *test])
 
 
 if __name__ == "__main__":

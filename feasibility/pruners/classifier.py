@@ -7,7 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.classifier import FeasibilityClassifier
+from feasibility.errors import InputError
 from feasibility.legs import Legs
+from feasibility.workers import own_threads
 
 
 @final
@@ -26,6 +28,9 @@ class ClassifierPruner:
         Share of the feasible legs to keep, above 0 and at most 1. The threshold
         follows from calibration legs that were not trained on, so the share is
         met on legs like those of the training.
+    threads : int, optional
+        Threads that share the work on a large batch; by default one for each processor, but one
+        in a worker process, whose siblings use the others. The answers do not depend on it.
 
     Attributes
     ----------
@@ -35,14 +40,17 @@ class ClassifierPruner:
     Raises
     ------
     InputError
-        `recall` is out of range.
+        `recall` or `threads` is out of range.
     """
 
     classifier: FeasibilityClassifier
     recall: float = 0.99
+    threads: int | None = None
     threshold: float = field(init=False)
 
     def __post_init__(self) -> None:
+        if self.threads is not None and self.threads < 1:
+            raise InputError(f"threads: {self.threads}, expected 1 or more")
         object.__setattr__(self, "threshold", self.classifier.threshold(self.recall))
 
     @property
@@ -66,5 +74,12 @@ class ClassifierPruner:
         unknown : (n,) bool
             True where it is outside the classifier's domain, and so survives in any case.
         """
+<<<<<<< Updated upstream
         probability, inside = self.classifier.assess(legs)
         return (probability >= self.threshold) | ~inside, ~inside
+=======
+        threads = self.threads or own_threads()
+        probability, inside = self.classifier.assess(legs, threads)
+        likely = probability >= self.threshold
+        return likely | ~inside, ~likely & ~inside
+>>>>>>> Stashed changes

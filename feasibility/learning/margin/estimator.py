@@ -1,5 +1,7 @@
 """`MarginEstimator`: a trained margin model, asked about legs; needs no torch."""
 
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from typing import Final, final
 
 import numpy as np
@@ -26,7 +28,8 @@ _Array = NDArray[np.float64]
 _UNKNOWN: Final = 0.5
 """Probability where no features exist, so that nothing is known."""
 
-_LEGS_AT_A_TIME: Final = 4096
+_LEGS_AT_A_TIME: Final = 2048
+"""Legs whose features are in the processor's cache at a time; the work of one thread."""
 
 
 @final
@@ -60,46 +63,64 @@ class MarginEstimator:
             self._settled_low, self._settled_high = (float(v) for v in quick["settled"])
             self._calibration = Calibration(artefact.section("calibration"))
             self._low, self._high = domain["low"], domain["high"]
+            mass = artefact.section("final_mass")
+            self._final_mass = MarginNet(mass) if mass else None
         except KeyError as error:
             raise InputError(f"model: array {error} is missing") from None
 
-    def assess(self, legs: Legs) -> tuple[_Array, NDArray[np.bool_]]:
-        """Return (n,) the probabilities of feasibility and whether the legs are in the domain."""
+    def assess(self, legs: Legs, threads: int = 1) -> tuple[_Array, NDArray[np.bool_]]:
+        """Return (n,) the probabilities of feasibility and whether the legs are in the domain.
+
+        The answers are the same, bit by bit, for any number of threads.
+        """
         n = len(legs)
         probability = np.full(n, _UNKNOWN)
         inside = np.zeros(n, dtype=np.bool_)
-        for first in range(0, n, _LEGS_AT_A_TIME):
-            rows = np.arange(first, min(first + _LEGS_AT_A_TIME, n))
-            part = legs.take(rows) if n > len(rows) else legs
-            probability[rows], inside[rows] = self._assess(part)
+        known = np.zeros(n, dtype=np.bool_)
+        open_ = np.zeros(n, dtype=np.bool_)
+
+        def settle(rows: NDArray[np.intp]) -> None:
+            probability[rows], inside[rows], known[rows], open_[rows] = self._settle(
+                legs.take(rows)
+            )
+
+        def look(rows: NDArray[np.intp]) -> None:
+            log_margin, doubt, near = self.estimate(legs.take(rows))
+            found = np.isfinite(log_margin)
+            p = np.full(len(rows), _UNKNOWN)
+            p[found] = self._calibration.probability(log_margin[found], doubt[found])
+            probability[rows] = p
+            # By the quick features wherever they exist, as the mass must not decide which.
+            inside[rows] = np.where(known[rows], inside[rows], near)
+
+        _in_blocks(settle, np.arange(n), threads)
+        _in_blocks(look, np.flatnonzero(open_), threads)
         return probability, inside
 
-    def _assess(self, legs: Legs) -> tuple[_Array, NDArray[np.bool_]]:
+    def _settle(
+        self, legs: Legs
+    ) -> tuple[_Array, NDArray[np.bool_], NDArray[np.bool_], NDArray[np.bool_]]:
+        """Return what the quick net knows.
+
+        Probability (1 or 0, nearly, where settled), whether in the domain, whether there are
+        quick features at all, and whether the other net has to look.
+        """
         X, hint = quick_features(legs)
-        probability = np.full(len(legs), _UNKNOWN)
-        inside = np.zeros(len(legs), dtype=np.bool_)
         known = np.isfinite(hint)
-        rows = np.flatnonzero(known)
-        inside[rows] = self._inside(X[rows])
-        correction, error = self._quick(X[rows])
-        actual = log_acceleration(legs, legs.m0)
-        ratio = (actual[rows] - hint[rows] - correction) / error
+        if known.all():
+            correction, error = self._quick(X)
+            inside = self._inside(X)
+        else:
+            rows = np.flatnonzero(known)
+            correction, error = np.zeros(len(legs)), np.full(len(legs), np.nan)
+            inside = np.zeros(len(legs), dtype=np.bool_)
+            correction[rows], error[rows] = self._quick(X[rows])
+            inside[rows] = self._inside(X[rows])
+        ratio = (log_acceleration(legs, legs.m0) - hint - correction) / error
         feasible = ratio > -self._settled_low
         infeasible = ratio < -self._settled_high
-        probability[rows[feasible]] = 1.0 - CERTAIN
-        probability[rows[infeasible]] = CERTAIN
-        open_rows = np.concatenate([np.flatnonzero(~known), rows[~(feasible | infeasible)]])
-        open_rows.sort()
-        if len(open_rows):
-            part = legs.take(open_rows)
-            log_margin, doubt, near = self.estimate(part)
-            found = np.isfinite(log_margin)
-            p = np.full(len(open_rows), _UNKNOWN)
-            p[found] = self._calibration.probability(log_margin[found], doubt[found])
-            probability[open_rows] = p
-            # By the quick features wherever they exist, as the mass must not decide which.
-            inside[open_rows] = np.where(known[open_rows], inside[open_rows], near)
-        return probability, inside
+        probability = np.where(feasible, 1.0 - CERTAIN, CERTAIN)
+        return probability, inside, known, ~(feasible | infeasible)
 
     def estimate(self, legs: Legs) -> tuple[_Array, _Array, NDArray[np.bool_]]:
         """Return (n,) log(m* / m0), its expected error, and whether the legs are in the domain.
@@ -138,7 +159,7 @@ class MarginEstimator:
         probability = np.full(len(legs), _UNKNOWN)
         probability[rows] = self._calibration.probability(log_margin[rows], doubt[rows])
         mass = np.full(len(legs), np.nan)
-        mass[rows] = final_mass(legs.take(rows), X[rows], log_margin[rows])
+        mass[rows] = final_mass(legs.take(rows), X[rows], log_margin[rows], self._final_mass)
         return LegPrediction(
             margin=np.exp(log_margin),
             margin_error=doubt,
@@ -151,3 +172,19 @@ class MarginEstimator:
         quantities = domain_quantities(X)
         inside = (self._low <= quantities) & (quantities <= self._high)
         return np.asarray(inside.all(axis=1))
+
+
+def _in_blocks(
+    work: Callable[[NDArray[np.intp]], None], rows: NDArray[np.intp], threads: int
+) -> None:
+    """Do the work on blocks of rows; numpy and the kernels let other threads run meanwhile."""
+    blocks = [
+        rows[first : first + _LEGS_AT_A_TIME] for first in range(0, len(rows), _LEGS_AT_A_TIME)
+    ]
+    if threads == 1 or len(blocks) < 2:
+        for block in blocks:
+            work(block)
+        return
+    with ThreadPoolExecutor(min(threads, len(blocks))) as pool:
+        for _ in pool.map(work, blocks):
+            pass

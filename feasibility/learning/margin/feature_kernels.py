@@ -19,20 +19,21 @@ from feasibility.learning.margin.path_kernels import (
     PathWork,
     first_path,
     flown_path,
-    gauss_row,
     gauss_rows,
+    impulse_effects,
+    sine_cosine,
     smallest_impulse,
     workspace,
 )
 from feasibility.orbits.lambert_kernels import lambert
 from feasibility.orbits.mima_kernels import mima_acceleration
-from feasibility.sims_flanagan.fast_element_kernels import from_elements, to_elements
+from feasibility.sims_flanagan.fast_element_kernels import to_elements
 
 _Array = NDArray[np.float64]
-LambertWork = tuple[_Array, _Array, _Array, _Array, _Array, _Array, _Array]
+LambertWork = tuple[_Array, _Array, _Array, _Array, _Array, _Array]
 FeatureWork = tuple[
     PathWork,
-    tuple[_Array, _Array, _Array, _Array, _Array, _Array],
+    tuple[_Array, _Array, _Array, _Array, _Array],
     LambertWork,
     tuple[_Array, NDArray[np.int64], _Array, _Array, _Array, _Array],
 ]
@@ -42,7 +43,7 @@ N_NEED = 14
 N_QUICK = N_GEOMETRY + N_NEED + 6
 N_FEATURES = N_GEOMETRY + N_NEED + 46
 MAX_REVS = 2
-QUICK_NODES = 10
+QUICK_NODES = 12
 
 _TWO_PI = 2.0 * math.pi
 _N_COUNTS = 5
@@ -113,7 +114,7 @@ def lambert_hints(
     SATURATED where there is none. `out` has 2 entries a number of revolutions,
     `branch` receives which branch it is, -1 for none.
     """
-    v1, v2, dv1, dv2, _, _, _ = lambert_work
+    v1, v2, dv1, dv2, _, _ = lambert_work
     lambert(s0[:3], s1[:3], tof, MAX_REVS, 1.0, v1, v2)
     for revs in range(MAX_REVS + 1):
         out[2 * revs] = SATURATED
@@ -152,8 +153,8 @@ def lambert_path(
     The path is the Lambert orbit itself, and d the effect of both impulses at arrival.
     SATURATED where there is none.
     """
-    v1, v2, dv1, dv2, state, x, row = lambert_work
-    path, rows, p, weights, g, c, m, d = path_work
+    v1, v2, dv1, dv2, state, x = lambert_work
+    path, rows, p, weights, g, c, m, d, anomaly = path_work
     for j in range(3):
         dv1[j] = v1[b, j] - s0[3 + j]
         dv2[j] = s1[3 + j] - v2[b, j]
@@ -161,25 +162,29 @@ def lambert_path(
         state[3 + j] = v1[b, j]
     if not to_elements(state, x):
         return SATURATED
-    for i in range(N_NODES):
-        for j in range(5):
-            path[i, j] = x[j]
-        path[i, 5] = x[5] + x[0] * tof * (i + 0.5) / N_NODES
-    if not gauss_rows(path, tof, N_NODES, rows):
-        return SATURATED
     for j in range(6):
         d[j] = 0.0
+    for i in range(N_NODES):
+        for j in range(5):
+            path[j * N_NODES + i] = x[j]
     for end in range(2):
-        r_end, v_end, dv = (s0, v1, dv1) if end == 0 else (s1, v2, dv2)
-        gauss_row(path, 0, x[5] + end * x[0] * tof, (1 - end) * tof, row)
-        add_impulse(r_end, v_end[b], dv, row, d)
+        path[5 * N_NODES + end] = x[5] + end * x[0] * tof
+        anomaly[end] = (1 - end) * tof
+    if not impulse_effects(path, 2, rows, anomaly):
+        return SATURATED
+    add_impulse(s0, v1[b], dv1, rows, 0, d)
+    add_impulse(s1, v2[b], dv2, rows, 1, d)
+    for i in range(N_NODES):
+        path[5 * N_NODES + i] = x[5] + x[0] * tof * (i + 0.5) / N_NODES
+    if not gauss_rows(path, tof, N_NODES, rows, anomaly):
+        return SATURATED
     z = smallest_impulse(rows, d, ve, 0.0, N_NODES, _FIRST_STEPS, p, weights, g, c, m)
     return z if 0.0 < z < SATURATED else SATURATED
 
 
 @kernel
-def add_impulse(r: _Array, v: _Array, dv: _Array, row: _Array, d: _Array) -> None:
-    """Add to d the effect of an impulse at position r[:3], velocity v (3,) of a path."""
+def add_impulse(r: _Array, v: _Array, dv: _Array, rows: _Array, i: int, d: _Array) -> None:
+    """Add to d the effect of an impulse at node i, where the state is r[:3] and v."""
     x, y, z = r[0], r[1], r[2]
     size = math.sqrt(x * x + y * y + z * z)
     hx, hy, hz = y * v[2] - z * v[1], z * v[0] - x * v[2], x * v[1] - y * v[0]
@@ -190,12 +195,37 @@ def add_impulse(r: _Array, v: _Array, dv: _Array, row: _Array, d: _Array) -> Non
     u = dv[0] * x + dv[1] * y + dv[2] * z
     t = dv[0] * tx + dv[1] * ty + dv[2] * tz
     o = dv[0] * hx + dv[1] * hy + dv[2] * hz
-    d[0] += row[0, 0] * u + row[0, 1] * t
-    d[1] += row[0, 2] * u + row[0, 3] * t + row[0, 4] * o
-    d[2] += row[0, 5] * u + row[0, 6] * t + row[0, 7] * o
-    d[3] += row[0, 8] * o
-    d[4] += row[0, 9] * o
-    d[5] += row[0, 10] * u + row[0, 11] * t + row[0, 12] * o
+    d[0] += rows[i] * u + rows[N_NODES + i] * t
+    d[1] += rows[2 * N_NODES + i] * u + rows[3 * N_NODES + i] * t + rows[4 * N_NODES + i] * o
+    d[2] += rows[5 * N_NODES + i] * u + rows[6 * N_NODES + i] * t + rows[7 * N_NODES + i] * o
+    d[3] += rows[8 * N_NODES + i] * o
+    d[4] += rows[9 * N_NODES + i] * o
+    d[5] += rows[10 * N_NODES + i] * u + rows[11 * N_NODES + i] * t + rows[12 * N_NODES + i] * o
+
+
+@kernel
+def coasted_state(n: float, ex: float, ey: float, longitude: float, state: _Array) -> None:
+    """Write x, y, 0 and the velocity of a plane orbit: elements as in `path_kernels`."""
+    f = longitude
+    for _ in range(20):
+        s, c = sine_cosine(f)
+        slope, curve = 1.0 - ex * c - ey * s, ex * s - ey * c
+        gap = f - curve - longitude
+        step = gap / (slope - 0.5 * gap / slope * curve)
+        f -= min(1.0, max(-1.0, step))
+        if abs(step) < 1e-4:
+            break
+    s, c = sine_cosine(f)
+    root_a = 1.0 / np.cbrt(n)
+    a = root_a * root_a
+    b = 1.0 / (1.0 + math.sqrt(1.0 - ex * ex - ey * ey))
+    na_r = n * a / (1.0 - ex * c - ey * s)
+    state[0] = a * ((1.0 - ey * ey * b) * c + ex * ey * b * s - ex)
+    state[1] = a * ((1.0 - ex * ex * b) * s + ex * ey * b * c - ey)
+    state[2] = 0.0
+    state[3] = na_r * (ex * ey * b * c - (1.0 - ey * ey * b) * s)
+    state[4] = na_r * ((1.0 - ex * ex * b) * c - ex * ey * b * s)
+    state[5] = 0.0
 
 
 @kernel
@@ -206,7 +236,6 @@ def geometry(
     tof: float,
     ve: float,
     near: float,
-    coasted: _Array,
     state: _Array,
     out: _Array,
 ) -> None:
@@ -224,10 +253,7 @@ def geometry(
     out[12] = math.cos(x1[5])
     out[13] = 0.25 * tof * (n0 + n1) / math.pi
     # Arrival against the coasted departure orbit, in the local frame there.
-    for j in range(5):
-        coasted[j] = x0[j]
-    coasted[5] = x0[5] + n0 * tof
-    from_elements(coasted, state)
+    coasted_state(n0, x0[1], x0[2], x0[5] + n0 * tof, state)
     r = math.sqrt(state[0] * state[0] + state[1] * state[1])
     cx, cy = state[0] / r, state[1] / r
     for part in range(2):
@@ -281,8 +307,8 @@ def quick_features(
     Parameters and result as for `leg_features`.
     """
     (
-        (path, rows, p, weights, g, c, m, d),
-        (s0, s1, x0, x1, coasted, state),
+        (path, rows, p, weights, g, c, m, d, anomaly),
+        (s0, s1, x0, x1, state),
         lambert_work,
         (lam, branch, _, _, _, _),
     ) = work
@@ -299,13 +325,13 @@ def quick_features(
         d[j] = x1[j] - x0[j]
     d[5] = mean + near - x0[0] * tof
     first_path(x0, x1, tof, near, _LEAST_MOTION, QUICK_NODES, path)
-    if not gauss_rows(path, tof, QUICK_NODES, rows):
+    if not gauss_rows(path, tof, QUICK_NODES, rows, anomaly):
         return np.nan
     z = smallest_impulse(rows, d, ve, 0.0, QUICK_NODES, 1, p, weights, g, c, m)
     if not 0.0 < z < SATURATED:
         return np.nan
     total = z * QUICK_NODES
-    geometry(s1, x0, x1, tof, ve, near, coasted, state, out)
+    geometry(s1, x0, x1, tof, ve, near, state, out)
     need(total, tof, ve, d, p, out)
     lambert_hints(s0, s1, tof, lambert_work, lam, branch)
     base = math.log(total)
@@ -348,9 +374,9 @@ def refine(
 
     A round that fails leaves the rest at the last value.
     """
-    path, rows, p, weights, g, c, m, d = path_work
+    path, rows, p, weights, g, c, m, d, anomaly = path_work
     first_path(x0, x1, tof, excess, least, N_NODES, path)
-    if not gauss_rows(path, tof, N_NODES, rows):
+    if not gauss_rows(path, tof, N_NODES, rows, anomaly):
         return False
     value = smallest_impulse(rows, d, ve, 0.0, N_NODES, _FIRST_STEPS, p, weights, g, c, m)
     if not 0.0 < value < SATURATED:
@@ -361,8 +387,10 @@ def refine(
         flown_path(x0, rows, weights, g, tof, N_NODES, flown)
         for i in range(N_NODES):
             for j in range(6):
-                path[i, j] += _DAMPING * (flown[i, j] - path[i, j])
-        if not gauss_rows(path, tof, N_NODES, rows):
+                path[j * N_NODES + i] += _DAMPING * (
+                    flown[j * N_NODES + i] - path[j * N_NODES + i]
+                )
+        if not gauss_rows(path, tof, N_NODES, rows, anomaly):
             return True
         value = smallest_impulse(rows, d, ve, value, N_NODES, _NEXT_STEPS, p, weights, g, c, m)
         if not 0.0 < value < SATURATED:
@@ -401,9 +429,9 @@ def leg_features(
         log of thrust / m*, unit mu / a_dep^2; NaN where an orbit is no ellipse
         or no hint exists (then `out` is NaN too).
     """
-    path_work, (s0, s1, x0, x1, coasted, state), lambert_work, hint_work = work
+    path_work, (s0, s1, x0, x1, state), lambert_work, hint_work = work
     lam, branch, flown, z_first, z, z_lambert = hint_work
-    path, rows, p, weights, g, c, m, d = path_work
+    path, rows, p, weights, g, c, m, d, anomaly = path_work
     for j in range(N_FEATURES):
         out[j] = np.nan
     a = to_frame(rv_dep, rv_arr, mu, s0, s1)
@@ -424,7 +452,7 @@ def leg_features(
         z_first[q] = SATURATED
         d[5] = mean + excess - x0[0] * tof
         first_path(x0, x1, tof, excess, least_motion(q), N_NODES, path)
-        if not gauss_rows(path, tof, N_NODES, rows):
+        if not gauss_rows(path, tof, N_NODES, rows, anomaly):
             continue
         value = smallest_impulse(rows, d, ve, 0.0, N_NODES, 1, p, weights, g, c, m)
         if not 0.0 < value < SATURATED:
@@ -460,7 +488,7 @@ def leg_features(
     base = math.log(hint)
     total = hint * N_NODES
 
-    geometry(s1, x0, x1, tof, ve, near, coasted, state, out)
+    geometry(s1, x0, x1, tof, ve, near, state, out)
     need(total, tof, ve, d, p, out)
     o = N_GEOMETRY + N_NEED
     out[o] = clip(excess / tof, -2.0, 2.0)
@@ -489,18 +517,18 @@ def leg_features(
     smallest = np.inf
     largest_use = 0.0
     for i in range(N_NODES):
-        average += g[i, 3] / N_NODES
-        smallest = min(smallest, g[i, 3])
-        largest_use = max(largest_use, weights[i] * g[i, 3] / c[i])
+        average += g[3 * N_NODES + i] / N_NODES
+        smallest = min(smallest, g[3 * N_NODES + i])
+        largest_use = max(largest_use, weights[i] * g[3 * N_NODES + i] / c[i])
     out[o] = smallest / average
     out[o + 1] = clip(math.log(largest_use) - base, -1.0, 1.0)
     o += 2
     for k in range(5):
         i = (0, 5, 10, 14, 19)[k]
-        length = max(g[i, 3], 1e-12 * average)
-        out[o] = g[i, 0] / length
-        out[o + 1] = g[i, 1] / length
-        out[o + 2] = g[i, 2] / length
+        length = max(g[3 * N_NODES + i], 1e-12 * average)
+        out[o] = g[i] / length
+        out[o + 1] = g[N_NODES + i] / length
+        out[o + 2] = g[2 * N_NODES + i] / length
         out[o + 3] = clip(length / average, 0.0, 4.0)
         o += 4
     # On short arcs the Lambert path is the better hint.
@@ -516,7 +544,7 @@ def feature_workspace() -> FeatureWork:
     branches = 1 + 2 * MAX_REVS
     return (
         workspace(),
-        (np.empty(6), np.empty(6), np.empty(6), np.empty(6), np.empty(6), np.empty(6)),
+        (np.empty(6), np.empty(6), np.empty(6), np.empty(6), np.empty(6)),
         (
             np.empty((branches, 3)),
             np.empty((branches, 3)),
@@ -524,12 +552,11 @@ def feature_workspace() -> FeatureWork:
             np.empty(3),
             np.empty(6),
             np.empty(6),
-            np.empty((1, 13)),
         ),
         (
             np.empty(2 * (MAX_REVS + 1)),
             np.empty(MAX_REVS + 1, np.int64),
-            np.empty((N_NODES, 6)),
+            np.empty(6 * N_NODES),
             np.empty(_N_COUNTS),
             np.empty(2 * (_N_ROUNDS + 1)),
             np.empty(MAX_REVS + 1),

@@ -30,10 +30,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.jit import kernel
+from feasibility.jit import kernel, summing_kernel
 
 _Array = NDArray[np.float64]
-PathWork = tuple[_Array, _Array, _Array, _Array, _Array, _Array, _Array, _Array]
+PathWork = tuple[_Array, _Array, _Array, _Array, _Array, _Array, _Array, _Array, _Array]
 
 N_NODES = 20
 """Segments, as many as the legs have whose maximum initial mass is to be estimated."""
@@ -41,93 +41,129 @@ N_NODES = 20
 SATURATED = 1e3
 """Stands for an impulse of a segment that is beyond all use, or cannot be estimated."""
 
-_TWO_PI = 2.0 * math.pi
+_TWO_OVER_PI = 2.0 / math.pi
+_HALF_PI_HEAD = 1.5707963267341256
+_HALF_PI_TAIL = 6.077100506506192e-11
+_ROUND = 1.5 * 2.0**52
 _LEAST_MOTION = 0.15
 _LARGEST_ECCENTRICITY2 = 0.9**2
 
 
 @kernel
-def turned(s: float, c: float, change: float) -> tuple[float, float]:
-    """Return sine and cosine of an angle that was changed: by their series where it suffices."""
-    if abs(change) < 0.3:
-        z = change * change
-        sine = change * (1.0 - z / 6.0 * (1.0 - z / 20.0 * (1.0 - z / 42.0)))
-        cosine = 1.0 - 0.5 * z * (1.0 - z / 12.0 * (1.0 - z / 30.0))
-    else:
-        sine = math.sin(change)
-        cosine = math.cos(change)
-    return s * cosine + c * sine, c * cosine - s * sine
+def sine_cosine(x: float) -> tuple[float, float]:
+    """Return sine and cosine to 1e-13, in arithmetic alone, so that a loop becomes vectors.
+
+    Series about the nearest multiple of a right angle, whose last bits Cody and Waite's two
+    parts of pi / 2 keep; adding and subtracting _ROUND rounds to a whole number.
+    """
+    quarter = (x * _TWO_OVER_PI + _ROUND) - _ROUND
+    r = (x - quarter * _HALF_PI_HEAD) - quarter * _HALF_PI_TAIL
+    z = r * r
+    s = 1.0 / 362880.0 - z * (1.0 / 39916800.0 - z * (1.0 / 6227020800.0))
+    s = r * (1.0 - z * (1.0 / 6.0 - z * (1.0 / 120.0 - z * (1.0 / 5040.0 - z * s))))
+    c = 1.0 / 40320.0 - z * (1.0 / 3628800.0 - z * (1.0 / 479001600.0))
+    c = 1.0 - z * (0.5 - z * (1.0 / 24.0 - z * (1.0 / 720.0 - z * c)))
+    # Which quarter, from -2 to 2.
+    place = quarter - 4.0 * ((0.25 * quarter + _ROUND) - _ROUND)
+    odd = abs(place) == 1.0
+    sine = c if odd else s
+    cosine = s if odd else c
+    # Of five places these have the signs turned: sine -2, -1, 2; cosine -2, 1, 2.
+    sine = -sine if abs(place - 0.25) > 1.0 else sine
+    cosine = -cosine if abs(place + 0.25) > 1.0 else cosine
+    return sine, cosine
 
 
 @kernel
-def gauss_row(x: _Array, i: int, longitude: float, remaining: float, out: _Array) -> bool:
-    """Write the 13 entries of C that are not zero, for one node; return False off the ellipses.
+def impulse_effects(path: _Array, nodes: int, rows: _Array, anomaly: _Array) -> bool:
+    """Write the 13 entries of C that are not zero, for each node; return False off the ellipses.
+
+    One loop for each step of the way, as the compiler makes vectors of short loops alone.
 
     Parameters
     ----------
-    x : (s, 5 or more) float64
-        n, ex, ey, h, k of all nodes.
-    i : int
-        The node.
-    longitude : float
-        Mean longitude.
-    remaining : float
-        Time to arrival.
-    out : (s, 13) float64
-        Effects of a radial, transverse and normal impulse: n by r and t; ex, ey by r, t
-        and n; h by n; k by n; l by r, t and n.
+    path : (6 N_NODES,) float64
+        n, ex, ey, h, k and mean longitude of the nodes.
+    nodes : int
+        How many there are.
+    rows : (13 N_NODES,) float64
+        Overwritten by the effects of a radial, transverse and normal impulse: n by r and t;
+        ex, ey by r, t and n; h by n; k by n; l by r, t and n.
+    anomaly : (6 N_NODES,) float64
+        First the time that remains to arrival, the rest is scratch.
     """
-    n, ex, ey, h, k = x[i, 0], x[i, 1], x[i, 2], x[i, 3], x[i, 4]
-    e2 = ex * ex + ey * ey
-    if not (n > _LEAST_MOTION and e2 < _LARGEST_ECCENTRICITY2):
-        return False
-    eta = math.sqrt(1.0 - e2)
-    b = 1.0 / (1.0 + eta)
+    for i in range(nodes):
+        ex, ey = path[N_NODES + i], path[2 * N_NODES + i]
+        if not (path[i] > _LEAST_MOTION and ex * ex + ey * ey < _LARGEST_ECCENTRICITY2):
+            return False
+    for i in range(nodes):
+        anomaly[N_NODES + i] = 1.0 / np.cbrt(path[i])
     # Kepler's equation l = F - ex sin F + ey cos F; the derivatives vanish nowhere (e < 1).
-    s = math.sin(longitude)
-    c = math.cos(longitude)
-    change = (ex * s - ey * c) / (1.0 - 0.8 * (ex * c + ey * s))
-    f = longitude + change
-    s, c = turned(s, c, change)
+    for i in range(nodes):
+        ex, ey, longitude = path[N_NODES + i], path[2 * N_NODES + i], path[5 * N_NODES + i]
+        s, c = sine_cosine(longitude)
+        # Halley's step from the mean longitude: mostly one more is enough.
+        slope, curve = 1.0 - ex * c - ey * s, ex * s - ey * c
+        anomaly[2 * N_NODES + i] = longitude + curve / (slope + 0.5 * curve * curve / slope)
+    for i in range(nodes):
+        s, c = sine_cosine(anomaly[2 * N_NODES + i])
+        anomaly[3 * N_NODES + i] = s
+        anomaly[4 * N_NODES + i] = c
     for _ in range(12):
-        slope = 1.0 - ex * c - ey * s
-        curve = ex * s - ey * c
-        gap = f - curve - longitude
-        newton = gap / slope
-        step = min(1.0, max(-1.0, gap / (slope - 0.5 * newton * curve)))
-        f -= step
-        s, c = turned(s, c, -step)
-        if abs(step) < 1e-3:
+        for i in range(nodes):
+            ex, ey = path[N_NODES + i], path[2 * N_NODES + i]
+            s, c = anomaly[3 * N_NODES + i], anomaly[4 * N_NODES + i]
+            slope = 1.0 - ex * c - ey * s
+            curve = ex * s - ey * c
+            gap = anomaly[2 * N_NODES + i] - curve - path[5 * N_NODES + i]
+            newton = gap / slope
+            step = min(1.0, max(-1.0, gap / (slope - 0.5 * newton * curve)))
+            anomaly[2 * N_NODES + i] -= step
+            anomaly[5 * N_NODES + i] = step
+        for i in range(nodes):
+            s, c = sine_cosine(anomaly[2 * N_NODES + i])
+            anomaly[3 * N_NODES + i] = s
+            anomaly[4 * N_NODES + i] = c
+        largest = 0.0
+        for i in range(nodes):
+            largest = max(largest, abs(anomaly[5 * N_NODES + i]))
+        if largest < 1e-3:
             break
-    root_a = 1.0 / np.cbrt(n)
-    a = root_a * root_a
-    r_a = 1.0 - ex * c - ey * s
-    cos_l = ((1.0 - ey * ey * b) * c + ex * ey * b * s - ex) / r_a
-    sin_l = ((1.0 - ex * ex * b) * s + ex * ey * b * c - ey) / r_a
-    p = a * eta * eta
-    r = a * r_a
-    w = p / r
-    sigma = ex * sin_l - ey * cos_l
-    chi = h * sin_l - k * cos_l
-    root = math.sqrt(p)
-    over = root / w
-    change_n = -3.0 * n * a / root
-    n_r = change_n * sigma
-    n_t = change_n * w
-    out[i, 0] = n_r
-    out[i, 1] = n_t
-    out[i, 2] = root * sin_l
-    out[i, 3] = over * ((w + 1.0) * cos_l + ex)
-    out[i, 4] = -over * chi * ey
-    out[i, 5] = -root * cos_l
-    out[i, 6] = over * ((w + 1.0) * sin_l + ey)
-    out[i, 7] = over * chi * ex
-    tilt = 0.5 * over * (1.0 + h * h + k * k)
-    out[i, 8] = tilt * cos_l
-    out[i, 9] = tilt * sin_l
-    out[i, 10] = -(p * (w - 1.0) * b + 2.0 * eta * r) / root + remaining * n_r
-    out[i, 11] = (p + r) * sigma * b / root + remaining * n_t
-    out[i, 12] = over * chi
+    for i in range(nodes):
+        n, ex, ey = path[i], path[N_NODES + i], path[2 * N_NODES + i]
+        h, k = path[3 * N_NODES + i], path[4 * N_NODES + i]
+        remaining, root_a = anomaly[i], anomaly[N_NODES + i]
+        s, c = anomaly[3 * N_NODES + i], anomaly[4 * N_NODES + i]
+        eta = math.sqrt(1.0 - ex * ex - ey * ey)
+        b = 1.0 / (1.0 + eta)
+        a = root_a * root_a
+        r_a = 1.0 - ex * c - ey * s
+        cos_l = ((1.0 - ey * ey * b) * c + ex * ey * b * s - ex) / r_a
+        sin_l = ((1.0 - ex * ex * b) * s + ex * ey * b * c - ey) / r_a
+        p = a * eta * eta
+        r = a * r_a
+        w = p / r
+        sigma = ex * sin_l - ey * cos_l
+        chi = h * sin_l - k * cos_l
+        root = root_a * eta
+        over = root / w
+        change_n = -3.0 * n * a / root
+        n_r = change_n * sigma
+        n_t = change_n * w
+        rows[i] = n_r
+        rows[N_NODES + i] = n_t
+        rows[2 * N_NODES + i] = root * sin_l
+        rows[3 * N_NODES + i] = over * ((w + 1.0) * cos_l + ex)
+        rows[4 * N_NODES + i] = -over * chi * ey
+        rows[5 * N_NODES + i] = -root * cos_l
+        rows[6 * N_NODES + i] = over * ((w + 1.0) * sin_l + ey)
+        rows[7 * N_NODES + i] = over * chi * ex
+        tilt = 0.5 * over * (1.0 + h * h + k * k)
+        rows[8 * N_NODES + i] = tilt * cos_l
+        rows[9 * N_NODES + i] = tilt * sin_l
+        rows[10 * N_NODES + i] = -(p * (w - 1.0) * b + 2.0 * eta * r) / root + remaining * n_r
+        rows[11 * N_NODES + i] = (p + r) * sigma * b / root + remaining * n_t
+        rows[12 * N_NODES + i] = over * chi
     return True
 
 
@@ -146,41 +182,52 @@ def first_path(
     bound = least * min(n0, n1)
     for i in range(nodes):
         s = (i + 0.5) / nodes
-        path[i, 0] = max(n0 + (n1 - n0) * s + 6.0 * excess / tof * s * (1.0 - s), bound)
+        path[i] = max(n0 + (n1 - n0) * s + 6.0 * excess / tof * s * (1.0 - s), bound)
         for j in range(1, 5):
-            path[i, j] = x0[j] + (x1[j] - x0[j]) * s
-        path[i, 5] = x0[5] + tof * s * (n0 + 0.5 * (n1 - n0) * s) + excess * s * s * (3 - 2 * s)
+            path[j * N_NODES + i] = x0[j] + (x1[j] - x0[j]) * s
+        path[5 * N_NODES + i] = (
+            x0[5] + tof * s * (n0 + 0.5 * (n1 - n0) * s) + excess * s * s * (3 - 2 * s)
+        )
 
 
 @kernel
-def gauss_rows(path: _Array, tof: float, nodes: int, rows: _Array) -> bool:
+def gauss_rows(path: _Array, tof: float, nodes: int, rows: _Array, anomaly: _Array) -> bool:
     """Write the rows of all nodes of a path; return False if it leaves the ellipses."""
     for i in range(nodes):
-        if not gauss_row(path, i, path[i, 5], tof * (1.0 - (i + 0.5) / nodes), rows):
-            return False
-    return True
+        anomaly[i] = tof * (1.0 - (i + 0.5) / nodes)
+    return impulse_effects(path, nodes, rows, anomaly)
 
 
 @kernel
 def duals(rows: _Array, p: _Array, nodes: int, g: _Array) -> None:
     """Write C_i^T p and its length, (4,) a node."""
     for i in range(nodes):
-        g0 = rows[i, 0] * p[0] + rows[i, 2] * p[1] + rows[i, 5] * p[2] + rows[i, 10] * p[5]
-        g1 = rows[i, 1] * p[0] + rows[i, 3] * p[1] + rows[i, 6] * p[2] + rows[i, 11] * p[5]
-        g2 = (
-            rows[i, 4] * p[1]
-            + rows[i, 7] * p[2]
-            + rows[i, 8] * p[3]
-            + rows[i, 9] * p[4]
-            + rows[i, 12] * p[5]
+        g0 = (
+            rows[i] * p[0]
+            + rows[2 * N_NODES + i] * p[1]
+            + rows[5 * N_NODES + i] * p[2]
+            + rows[10 * N_NODES + i] * p[5]
         )
-        g[i, 0] = g0
-        g[i, 1] = g1
-        g[i, 2] = g2
-        g[i, 3] = math.sqrt(g0 * g0 + g1 * g1 + g2 * g2)
+        g1 = (
+            rows[N_NODES + i] * p[0]
+            + rows[3 * N_NODES + i] * p[1]
+            + rows[6 * N_NODES + i] * p[2]
+            + rows[11 * N_NODES + i] * p[5]
+        )
+        g2 = (
+            rows[4 * N_NODES + i] * p[1]
+            + rows[7 * N_NODES + i] * p[2]
+            + rows[8 * N_NODES + i] * p[3]
+            + rows[9 * N_NODES + i] * p[4]
+            + rows[12 * N_NODES + i] * p[5]
+        )
+        g[i] = g0
+        g[N_NODES + i] = g1
+        g[2 * N_NODES + i] = g2
+        g[3 * N_NODES + i] = math.sqrt(g0 * g0 + g1 * g1 + g2 * g2)
 
 
-@kernel
+@summing_kernel
 def weighted_solve(
     rows: _Array, weights: _Array, d: _Array, nodes: int, m: _Array, p: _Array
 ) -> bool:
@@ -195,29 +242,52 @@ def weighted_solve(
     g22 = g23 = g24 = g25 = g33 = g34 = g35 = g44 = g45 = g55 = 0.0
     for i in range(nodes):
         w = weights[i]
-        n0, n1 = w * rows[i, 0], w * rows[i, 1]
-        a0, a1, a2 = w * rows[i, 2], w * rows[i, 3], w * rows[i, 4]
-        b0, b1, b2 = w * rows[i, 5], w * rows[i, 6], w * rows[i, 7]
-        h2, k2, l2 = w * rows[i, 8], w * rows[i, 9], w * rows[i, 12]
-        g00 += n0 * rows[i, 0] + n1 * rows[i, 1]
-        g01 += n0 * rows[i, 2] + n1 * rows[i, 3]
-        g02 += n0 * rows[i, 5] + n1 * rows[i, 6]
-        g05 += n0 * rows[i, 10] + n1 * rows[i, 11]
-        g11 += a0 * rows[i, 2] + a1 * rows[i, 3] + a2 * rows[i, 4]
-        g12 += a0 * rows[i, 5] + a1 * rows[i, 6] + a2 * rows[i, 7]
-        g13 += a2 * rows[i, 8]
-        g14 += a2 * rows[i, 9]
-        g15 += a0 * rows[i, 10] + a1 * rows[i, 11] + a2 * rows[i, 12]
-        g22 += b0 * rows[i, 5] + b1 * rows[i, 6] + b2 * rows[i, 7]
-        g23 += b2 * rows[i, 8]
-        g24 += b2 * rows[i, 9]
-        g25 += b0 * rows[i, 10] + b1 * rows[i, 11] + b2 * rows[i, 12]
-        g33 += h2 * rows[i, 8]
-        g34 += h2 * rows[i, 9]
-        g35 += h2 * rows[i, 12]
-        g44 += k2 * rows[i, 9]
-        g45 += k2 * rows[i, 12]
-        g55 += w * (rows[i, 10] * rows[i, 10] + rows[i, 11] * rows[i, 11]) + l2 * rows[i, 12]
+        n0, n1 = w * rows[i], w * rows[N_NODES + i]
+        a0, a1, a2 = (
+            w * rows[2 * N_NODES + i],
+            w * rows[3 * N_NODES + i],
+            w * rows[4 * N_NODES + i],
+        )
+        b0, b1, b2 = (
+            w * rows[5 * N_NODES + i],
+            w * rows[6 * N_NODES + i],
+            w * rows[7 * N_NODES + i],
+        )
+        h2, k2, l2 = (
+            w * rows[8 * N_NODES + i],
+            w * rows[9 * N_NODES + i],
+            w * rows[12 * N_NODES + i],
+        )
+        g00 += n0 * rows[i] + n1 * rows[N_NODES + i]
+        g01 += n0 * rows[2 * N_NODES + i] + n1 * rows[3 * N_NODES + i]
+        g02 += n0 * rows[5 * N_NODES + i] + n1 * rows[6 * N_NODES + i]
+        g05 += n0 * rows[10 * N_NODES + i] + n1 * rows[11 * N_NODES + i]
+        g11 += a0 * rows[2 * N_NODES + i] + a1 * rows[3 * N_NODES + i] + a2 * rows[4 * N_NODES + i]
+        g12 += a0 * rows[5 * N_NODES + i] + a1 * rows[6 * N_NODES + i] + a2 * rows[7 * N_NODES + i]
+        g13 += a2 * rows[8 * N_NODES + i]
+        g14 += a2 * rows[9 * N_NODES + i]
+        g15 += (
+            a0 * rows[10 * N_NODES + i] + a1 * rows[11 * N_NODES + i] + a2 * rows[12 * N_NODES + i]
+        )
+        g22 += b0 * rows[5 * N_NODES + i] + b1 * rows[6 * N_NODES + i] + b2 * rows[7 * N_NODES + i]
+        g23 += b2 * rows[8 * N_NODES + i]
+        g24 += b2 * rows[9 * N_NODES + i]
+        g25 += (
+            b0 * rows[10 * N_NODES + i] + b1 * rows[11 * N_NODES + i] + b2 * rows[12 * N_NODES + i]
+        )
+        g33 += h2 * rows[8 * N_NODES + i]
+        g34 += h2 * rows[9 * N_NODES + i]
+        g35 += h2 * rows[12 * N_NODES + i]
+        g44 += k2 * rows[9 * N_NODES + i]
+        g45 += k2 * rows[12 * N_NODES + i]
+        g55 += (
+            w
+            * (
+                rows[10 * N_NODES + i] * rows[10 * N_NODES + i]
+                + rows[11 * N_NODES + i] * rows[11 * N_NODES + i]
+            )
+            + l2 * rows[12 * N_NODES + i]
+        )
     m[0, 0], m[1, 0], m[2, 0], m[3, 0], m[4, 0], m[5, 0] = g00, g01, g02, 0.0, 0.0, g05
     m[1, 1], m[2, 1], m[3, 1], m[4, 1], m[5, 1] = g11, g12, g13, g14, g15
     m[2, 2], m[3, 2], m[4, 2], m[5, 2] = g22, g23, g24, g25
@@ -257,7 +327,7 @@ def spent_segments(i: int, nodes: int) -> int:
     return i if 2 * i < nodes else i + 1
 
 
-@kernel
+@summing_kernel
 def balanced_impulse(
     value: float, g: _Array, exhaust_velocity: float, nodes: int, c: _Array
 ) -> float:
@@ -269,7 +339,7 @@ def balanced_impulse(
     """
     total = 0.0
     for i in range(nodes):
-        total += g[i, 3]
+        total += g[3 * N_NODES + i]
     largest = (1.0 - 1e-3) * exhaust_velocity / nodes
     # With every mass the initial one z is too large, with every mass the final one too small.
     z = value / total
@@ -280,8 +350,8 @@ def balanced_impulse(
         for i in range(nodes):
             ratio = 1.0 / (1.0 - z * spent_segments(i, nodes) / exhaust_velocity)
             c[i] = ratio
-            total += ratio * g[i, 3]
-            slope += ratio * ratio * g[i, 3]
+            total += ratio * g[3 * N_NODES + i]
+            slope += ratio * ratio * g[3 * N_NODES + i]
         gap = value - z * total
         if abs(gap) <= 1e-6 * value or z >= largest:
             break
@@ -335,10 +405,10 @@ def reweight(g: _Array, c: _Array, nodes: int, weights: _Array) -> None:
     """Write weights c_i / |g_i|, bounded where a dual nearly vanishes."""
     mean = 0.0
     for i in range(nodes):
-        mean += g[i, 3]
+        mean += g[3 * N_NODES + i]
     least = 0.02 * mean / nodes
     for i in range(nodes):
-        weights[i] = c[i] / max(g[i, 3], least)
+        weights[i] = c[i] / max(g[3 * N_NODES + i], least)
 
 
 @kernel
@@ -351,20 +421,25 @@ def flown_path(
     longitude = x0[5] + 0.5 * n * dt
     for i in range(nodes):
         w = 0.5 * weights[i]
-        r, t, o = w * g[i, 0], w * g[i, 1], w * g[i, 2]
+        r, t, o = w * g[i], w * g[N_NODES + i], w * g[2 * N_NODES + i]
         remaining = tof - (i + 0.5) * dt
-        dn = rows[i, 0] * r + rows[i, 1] * t
-        dex = rows[i, 2] * r + rows[i, 3] * t + rows[i, 4] * o
-        dey = rows[i, 5] * r + rows[i, 6] * t + rows[i, 7] * o
-        dh = rows[i, 8] * o
-        dk = rows[i, 9] * o
-        dl = rows[i, 10] * r + rows[i, 11] * t + rows[i, 12] * o - remaining * dn
-        path[i, 0] = n + dn
-        path[i, 1] = ex + dex
-        path[i, 2] = ey + dey
-        path[i, 3] = h + dh
-        path[i, 4] = k + dk
-        path[i, 5] = longitude + dl
+        dn = rows[i] * r + rows[N_NODES + i] * t
+        dex = rows[2 * N_NODES + i] * r + rows[3 * N_NODES + i] * t + rows[4 * N_NODES + i] * o
+        dey = rows[5 * N_NODES + i] * r + rows[6 * N_NODES + i] * t + rows[7 * N_NODES + i] * o
+        dh = rows[8 * N_NODES + i] * o
+        dk = rows[9 * N_NODES + i] * o
+        dl = (
+            rows[10 * N_NODES + i] * r
+            + rows[11 * N_NODES + i] * t
+            + rows[12 * N_NODES + i] * o
+            - remaining * dn
+        )
+        path[i] = n + dn
+        path[N_NODES + i] = ex + dex
+        path[2 * N_NODES + i] = ey + dey
+        path[3 * N_NODES + i] = h + dh
+        path[4 * N_NODES + i] = k + dk
+        path[5 * N_NODES + i] = longitude + dl
         n += 2.0 * dn
         ex += 2.0 * dex
         ey += 2.0 * dey
@@ -375,14 +450,15 @@ def flown_path(
 
 @kernel
 def workspace() -> PathWork:
-    """Return scratch arrays: path, rows, p, weights, g, c, m, d."""
+    """Return scratch arrays: path, rows, p, weights, g, c, m, d, anomaly."""
     return (
-        np.empty((N_NODES, 6)),
-        np.empty((N_NODES, 13)),
+        np.empty(6 * N_NODES),
+        np.empty(13 * N_NODES),
         np.empty(6),
         np.empty(N_NODES),
-        np.empty((N_NODES, 4)),
+        np.empty(4 * N_NODES),
         np.empty(N_NODES),
         np.empty((6, 6)),
         np.empty(6),
+        np.empty(6 * N_NODES),
     )
