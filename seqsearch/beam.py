@@ -13,6 +13,7 @@ from feasibility import AllOf, InputError, Pruner
 from feasibility.orbits import OrbitalNeighbours
 from feasibility.pruners.predictor import LegPredictor
 from seqsearch.audit import RankSample
+from seqsearch.best_nodes import best_nodes
 from seqsearch.counters import RankCounters
 from seqsearch.deadline import Deadline
 from seqsearch.expanders import Expander, ForecastExpander, GridExpander
@@ -55,6 +56,16 @@ class SearchResult:
     tree: SearchTree
     counters: list[RankCounters]
     stopped: str
+
+    def best_tours(self, problem: TourProblem, count: int) -> list[Tour]:
+        """Return tours that visit different bodies, best first, for a polish to start from.
+
+        Most visits first, then the least sum of the shares of time and propellant used up.
+        """
+        return [
+            Tour.from_tree(problem, self.tree, node)
+            for node in best_nodes(self.tree, problem, count)
+        ]
 
 
 def search(

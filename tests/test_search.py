@@ -10,7 +10,7 @@ import pytest
 
 from feasibility import AllOf, KeepAll, Mima2Pruner
 from feasibility.workers import worker_pool
-from seqsearch import search
+from seqsearch import search, verify_tour
 from tests.problems import small_problem, small_settings
 
 
@@ -130,3 +130,41 @@ def test_searches_run_side_by_side_in_threads(problem, result):
     for thread in threads:
         thread.join()
     assert found == [result.tour, result.tour]
+
+
+@pytest.fixture(scope="module")
+def predicted(problem):
+    settings = small_settings(pruner="default:0.99")
+    return search(problem, settings=settings, rng=np.random.default_rng(4))
+
+
+def test_with_a_classifier_most_of_what_is_optimised_can_be_flown(predicted, problem):
+    assert predicted.tour.n_asteroids >= 3
+    assert verify_tour(predicted.tour).passed
+    optimised = sum(record.optimised for record in predicted.counters)
+    feasible = sum(record.feasible for record in predicted.counters)
+    proposed = sum(record.proposed for record in predicted.counters)
+    assert feasible >= 0.8 * optimised
+    assert 20 * optimised <= proposed
+
+
+def test_with_a_classifier_workers_and_threads_do_not_change_the_tour(predicted, problem):
+    with worker_pool(2) as pool:
+        parallel = search(
+            problem,
+            settings=small_settings(pruner="default:0.99"),
+            rng=np.random.default_rng(4),
+            executor=pool,
+            threads=3,
+        )
+    assert parallel.tour == predicted.tour
+    assert [record.questions for record in parallel.counters] == [
+        record.questions for record in predicted.counters
+    ]
+
+
+def test_best_tours_visit_different_bodies_and_come_best_first(result, problem):
+    tours = result.best_tours(problem, 5)
+    assert tours[0].n_asteroids == result.tour.n_asteroids
+    assert len({frozenset(body.id for body in tour.bodies) for tour in tours}) == len(tours) == 5
+    assert np.all(np.diff([tour.n_asteroids for tour in tours]) <= 0)
