@@ -1,7 +1,7 @@
 """What a pruner buys: the same search with several pruners, one after the other in one run.
 
 Run from the repository: python benchmarks/search.py --catalogue GTOC7-DATA.txt
-[--time-limit 2min] [--seed 0] [--workers 2] [--out FILE.json]
+[--time-limit 2min | --beam-width 50] [--seed 0] [--workers 2] [--out FILE.json]
 
 Problem, seed and wall-clock budget are the same for all. With a classifier the search
 chooses flight times by its answers; with the other pruners it proposes a fixed grid of
@@ -9,6 +9,7 @@ them. The false-prune rate is that of the audit, the same for all: legs are sort
 default model, and optimised by the solver of the search. "for N" is how many legs had been
 optimised when the tour first had as many asteroids as without pruning at the end.
 Times are by the wall clock: other work on the same cores makes all runs shorter of breath.
+With --beam-width instead of a time limit, nothing but the seconds depends on the machine.
 """
 
 import argparse
@@ -81,7 +82,7 @@ def run(
             rng=np.random.default_rng(options.seed),
             executor=pool,
             threads=options.workers,
-            time_limit_s=parse_duration(options.time_limit),
+            time_limit_s=None if options.beam_width else parse_duration(options.time_limit),
             on_rank=on_rank,
         )
         seconds = time.perf_counter() - began
@@ -120,21 +121,25 @@ def main() -> None:
     parser.add_argument("--catalogue", required=True, help="GTOC7-DATA.txt")
     parser.add_argument("--problem", default="gtoc7")
     parser.add_argument("--time-limit", default="2min", help="of each run")
+    parser.add_argument("--beam-width", type=int, help="one pass so wide, without a time limit")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
     parser.add_argument("--pruners", nargs="+", default=PRUNERS, help="the first is the measure")
     parser.add_argument("--out", type=Path, help="also write the figures as JSON")
     options = parser.parse_args()
     config = with_catalogue(read_config(options.problem), options.catalogue)
+    settings, budget = config.search, f"{options.time_limit} each"
+    if options.beam_width:
+        settings, budget = settings.with_(beam_width=options.beam_width), "one pass each"
     problem = build_problem(config)
     compile_kernels()
     rows: list[Row] = []
     for pruner in options.pruners:
-        rows.append(run(problem, config.search, pruner, options))
+        rows.append(run(problem, settings, pruner, options))
         if len(rows) == 1:
             print(
                 f"{problem.name}, {problem.catalogue.source}, seed {options.seed}, "
-                f"{options.time_limit} each, {options.workers} workers\n"
+                f"{budget}, {options.workers} workers\n"
                 f"{'pruner':<13} asteroids verified {'proposed':>11} optimised flyable  seconds  "
                 f"{'flyable legs pruned (95 %)':<26} {f'for {rows[0].asteroids}':>8}"
             )
