@@ -74,12 +74,6 @@ class ClassifierPruner:
         unknown : (n,) bool
             True where it is outside the classifier's domain, and so survives in any case.
         """
-<<<<<<< Updated upstream
-        probability, inside = self.classifier.assess(legs)
-        return (probability >= self.threshold) | ~inside, ~inside
-=======
         threads = self.threads or own_threads()
         probability, inside = self.classifier.assess(legs, threads)
-        likely = probability >= self.threshold
-        return likely | ~inside, ~likely & ~inside
->>>>>>> Stashed changes
+        return (probability >= self.threshold) | ~inside, ~inside
