@@ -73,14 +73,15 @@ def train_final_mass(
         targets.append(np.log(used / full_thrust_velocity(legs, np.maximum(log_margin, 0.0))))
         kept.append(pair[flown])
     X, target = np.concatenate(inputs), np.concatenate(targets)
+    # A tenth is for validation, and the rest has to fill a batch.
+    if len(X) < recipe.batch / SHARES[0] + 1:
+        raise InputError(
+            f"final mass: {len(X)} legs with minimum propellant, expected more than a batch of "
+            f"{recipe.batch}; generate them with propellant = true"
+        )
     rng = np.random.default_rng([recipe.seed, 3])
     part = split_pairs(np.concatenate(kept), SHARES, rng)
     learned, validation = np.flatnonzero(part == 0), np.flatnonzero(part == 1)
-    if len(learned) < recipe.batch or not len(validation):
-        raise InputError(
-            f"final mass: {len(learned)} legs with minimum propellant to learn from, expected at "
-            f"least {recipe.batch}; generate them with propellant = true"
-        )
     net = fit_net(
         X, target, np.ones(len(X)), learned, validation, recipe,
         layers=recipe.layers, width=recipe.width, epochs=recipe.epochs, unit=UNIT,
