@@ -20,6 +20,7 @@ Sims-Flanagan model.
   seqsearch run demo                      a synthetic belt; needs no file
   seqsearch run gtoc7 --catalogue FILE    one GTOC7 probe on the official table
   seqsearch resume runs/demo              go on after an interruption
+  seqsearch polish runs/demo              improve its tour
   seqsearch verify runs/demo              check the result independently
 """
 
@@ -44,6 +45,16 @@ Go on with a run that was interrupted, killed or stopped by a limit.
 The run goes on after the last rank that it finished. With the same limits it ends with
 the same tour as if it had never stopped. Limits count what earlier sessions used: a run
 that has used up its limit needs a larger one.
+"""
+
+_POLISH: Final = """\
+Make the best tours of a run shorter in time and, with what that frees, longer in asteroids.
+
+All epochs and stays of a tour are optimised together; then other bodies are tried at its
+ends, and more of them, each time with all epochs anew. sequence.json is replaced if the
+result is better, and sequence.search.json keeps what the search found; polish.json says
+what was gained. The same seed gives the same tour with any number of workers, unless a
+time limit cuts the work short.
 """
 
 _FIGURES: Final = (".png", ".svg", ".pdf")
@@ -89,6 +100,11 @@ def _parser() -> argparse.ArgumentParser:
         "trained model; none keeps all",
     )
     run.add_argument("--solver", choices=("fast", "reference"), help="leg solver")
+    run.add_argument(
+        "--polish",
+        metavar="T",
+        help="then polish the best tours for 90s, 5min (see polish)",
+    )
     run.set_defaults(run=_run)
 
     resume = commands.add_parser(
@@ -102,6 +118,17 @@ def _parser() -> argparse.ArgumentParser:
     )
     _add_budget(resume)
     resume.set_defaults(run=_resume)
+
+    polish = commands.add_parser(
+        "polish", help="improve a run's tour", description=_POLISH, formatter_class=raw
+    )
+    polish.add_argument("path", metavar="RUN", help="run folder")
+    polish.add_argument(
+        "--time-limit", metavar="T", help="stop after 90s, 10min, 1h (default: after some rounds)"
+    )
+    polish.add_argument("--seed", type=int, default=0, help="seed of the moves (default: 0)")
+    polish.add_argument("--workers", type=int, help="processes (default: one a core)")
+    polish.set_defaults(run=_polish)
 
     verify = commands.add_parser(
         "verify",
@@ -175,6 +202,7 @@ def _run(options: argparse.Namespace) -> int:
             "pruner": options.pruner,
             "solver": options.solver,
         },
+        polish_s=_seconds(options.polish, "--polish"),
     )
 
 
@@ -190,23 +218,42 @@ def _resume(options: argparse.Namespace) -> int:
     )
 
 
-def _seconds(duration: str | None) -> float | None:
-    return None if duration is None else parse_duration(duration)
+def _polish(options: argparse.Namespace) -> int:
+    from seqsearch.command_polish import polish_run
+
+    return polish_run(
+        Path(options.path),
+        time_limit_s=_seconds(options.time_limit),
+        seed=options.seed,
+        workers=options.workers,
+    )
+
+
+def _seconds(duration: str | None, option: str = "--time-limit") -> float | None:
+    return None if duration is None else parse_duration(duration, option)
 
 
 def _verify(options: argparse.Namespace) -> int:
     from feasibility.orbits import read_catalogue
+    from seqsearch.fleet import check_disjoint, is_fleet, read_fleet
     from seqsearch.tour import read_tour
-    from seqsearch.verify import verify_tour
+    from seqsearch.verify import Verification, verify_tour
 
-    tour = read_tour(_sequence_path(options.path))
     catalogue = None if options.catalogue is None else read_catalogue(Path(options.catalogue))
-    verification = verify_tour(tour, catalogue)
-    print(tour.one_line())
-    print(tour.summary())
-    print(verification.table())
-    print("verified" if verification.passed else "NOT verified")
-    return 0 if verification.passed else 1
+    fleet = is_fleet(Path(options.path))
+    tours = read_fleet(Path(options.path)) if fleet else [read_tour(_sequence_path(options.path))]
+    outcomes = [verify_tour(tour, catalogue) for tour in tours]
+    for tour, verification in zip(tours, outcomes, strict=True):
+        print(tour.one_line())
+        print(tour.summary())
+        print(verification.table())
+    if fleet:
+        outcomes.append(Verification((check_disjoint(tours),)))
+        print(f"{sum(tour.n_asteroids for tour in tours)} asteroids on {len(tours)} probes")
+        print(outcomes[-1].table())
+    passed = all(verification.passed for verification in outcomes)
+    print("verified" if passed else "NOT verified")
+    return 0 if passed else 1
 
 
 def _plot(options: argparse.Namespace) -> int:
@@ -241,7 +288,7 @@ def _problems(options: argparse.Namespace) -> int:
     return 0
 
 
-def parse_duration(text: str) -> float:
+def parse_duration(text: str, option: str = "--time-limit") -> float:
     """Return a duration such as ``90s``, ``10min``, ``1.5h`` or ``600`` in seconds.
 
     Raises
@@ -251,5 +298,5 @@ def parse_duration(text: str) -> float:
     """
     match = re.fullmatch(r"\s*([0-9]*\.?[0-9]+)\s*([a-z]*)\s*", text)
     if match is None or match[2] not in _UNITS_S or float(match[1]) <= 0:
-        raise InputError(f"--time-limit {text!r}: expected a duration such as 90s, 10min or 1h")
+        raise InputError(f"{option} {text!r}: expected a duration such as 90s, 10min or 1h")
     return float(match[1]) * _UNITS_S[match[2]]

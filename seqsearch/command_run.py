@@ -7,7 +7,9 @@ import numpy as np
 
 from feasibility import InputError
 from seqsearch.checkpoint import Checkpoints, Origin, catalogue_digest
-from seqsearch.config import build_problem, override, read_config, with_catalogue
+from seqsearch.command_fleet import run_fleet
+from seqsearch.command_polish import polish_run
+from seqsearch.config import Config, build_problem, override, read_config, with_catalogue
 from seqsearch.pruner_spec import parse_pruner
 from seqsearch.run_folder import RunFolder
 from seqsearch.session import Budget, run_session
@@ -22,8 +24,12 @@ def run_search(
     seed: int,
     budget: Budget,
     overrides: dict[str, Any],
+    polish_s: float | None = None,
 ) -> int:
     """Run a search as the command line asks for it and return the exit code.
+
+    With `polish_s`, the best tours are polished for so many seconds afterwards.
+    A fleet polishes each probe within the time limit instead.
 
     Everything is read and checked before the run folder is made.
 
@@ -40,9 +46,26 @@ def run_search(
     if config.catalogue.file is not None:
         # The run folder's copy is read from elsewhere when the run is resumed.
         config = with_catalogue(config, str(Path(config.catalogue.file).absolute()))
+    folder = out or Path("runs") / config.problem.name
+    if config.fleet.probes > 1:
+        return run_fleet(config, folder, seed=seed, budget=budget, search_probe=begin_search)
+    code = begin_search(config, folder, seed, budget)
+    if code == 0 and polish_s is not None:
+        code = polish_run(folder, time_limit_s=polish_s, seed=seed, workers=budget.workers)
+    return code
+
+
+def begin_search(config: Config, path: Path, seed: int, budget: Budget) -> int:
+    """Make a run folder, search with a configuration and return the exit code.
+
+    Raises
+    ------
+    InputError
+        Anything in the configuration that cannot be used, or the folder exists.
+    """
     pruner = parse_pruner(config.search.pruner)
     problem = build_problem(config)
-    folder = RunFolder.create(out or Path("runs") / config.problem.name, config, seed)
+    folder = RunFolder.create(path, config, seed)
     rng = np.random.default_rng(seed)
     state = SearchState(settings=config.search, rng_state=dict(rng.bit_generator.state))
     origin = Origin(

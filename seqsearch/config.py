@@ -53,11 +53,23 @@ class MissionTable(_Table, frozen=True, kw_only=True):
 
 @final
 class CatalogueTable(_Table, frozen=True, kw_only=True):
-    """Table ``[catalogue]``: a file, or a synthetic belt, or neither (then --catalogue)."""
+    """Table ``[catalogue]``: a file, or a synthetic belt, or neither (then --catalogue).
+
+    Bodies in `exclude_ids` are left out.
+    """
 
     file: str | None = None
     synthetic_bodies: Annotated[int, Meta(ge=2)] | None = None
     synthetic_seed: Annotated[int, Meta(ge=0)] = 0
+    exclude_ids: tuple[int, ...] = ()
+
+
+@final
+class FleetTable(_Table, frozen=True, kw_only=True):
+    """Table ``[fleet]``: probes that share no asteroid, and how much of the time is polishing."""
+
+    probes: Annotated[int, Meta(ge=1, le=100)] = 1
+    polish_share: Annotated[float, Meta(ge=0, le=0.9)] = 0.4
 
 
 @final
@@ -69,6 +81,7 @@ class Config(_Table, frozen=True, kw_only=True):
     mission: MissionTable
     catalogue: CatalogueTable = msgspec.field(default_factory=CatalogueTable)
     gtoc5: Gtoc5Rules | None = None
+    fleet: FleetTable = msgspec.field(default_factory=FleetTable)
     search: SearchSettings = msgspec.field(default_factory=SearchSettings)
 
 
@@ -157,8 +170,9 @@ def override(config: Config, **changes: Any) -> Config:
 
 
 def with_catalogue(config: Config, file: str) -> Config:
-    """Return the configuration with another catalogue file."""
-    return msgspec.structs.replace(config, catalogue=CatalogueTable(file=file))
+    """Return the configuration with another catalogue file, less the same bodies."""
+    table = CatalogueTable(file=file, exclude_ids=config.catalogue.exclude_ids)
+    return msgspec.structs.replace(config, catalogue=table)
 
 
 def build_problem(config: Config) -> TourProblem:
@@ -182,9 +196,21 @@ def build_problem(config: Config) -> TourProblem:
         first_departure_mjd2000=(mjd_to_mjd2000(earliest), mjd_to_mjd2000(latest)),
         max_duration_days=mission.max_duration_days,
         min_stay_days=mission.min_stay_days,
-        start_ids=mission.start_ids,
+        start_ids=_start_ids(config),
     )
     return problem if config.gtoc5 is None else Gtoc5Problem(base=problem, rules=config.gtoc5)
+
+
+def _start_ids(config: Config) -> tuple[int, ...]:
+    """Return the ids of start bodies that are not excluded."""
+    given, excluded = config.mission.start_ids, set(config.catalogue.exclude_ids)
+    left = tuple(body for body in given if body not in excluded)
+    if given and not left:
+        raise InputError(
+            f"problem {config.problem.name}: all of start_ids are in exclude_ids, "
+            "expected one that is not"
+        )
+    return left
 
 
 def load_problem(problem: str, catalogue: str | Path | None = None) -> TourProblem:
@@ -207,6 +233,13 @@ def load_problem(problem: str, catalogue: str | Path | None = None) -> TourProbl
 
 
 def _load_catalogue(config: Config) -> Catalogue:
+    catalogue = _whole_catalogue(config)
+    excluded = catalogue.rows_of(np.asarray(config.catalogue.exclude_ids, dtype=np.int64))
+    kept = np.setdiff1d(np.arange(len(catalogue)), excluded)
+    return catalogue.select(kept) if len(excluded) else catalogue
+
+
+def _whole_catalogue(config: Config) -> Catalogue:
     table = config.catalogue
     if table.file is not None and table.synthetic_bodies is not None:
         raise InputError(

@@ -1,0 +1,89 @@
+"""`Itinerary`: which bodies in which order, and when; nothing about how the legs are flown."""
+
+from dataclasses import dataclass
+from typing import Self, final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from feasibility import Legs
+from seqsearch.problem import Problem
+from seqsearch.tour import Tour
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Itinerary:
+    """A sequence of bodies and a timetable. With n the number of legs.
+
+    Attributes
+    ----------
+    rows : (n + 1,) intp
+        Catalogue rows of the bodies in order of visit.
+    t_dep_mjd2000 : (n,) float64
+        Departure epochs.
+    tof_days : (n,) float64
+        Flight times, positive.
+    """
+
+    rows: NDArray[np.intp]
+    t_dep_mjd2000: NDArray[np.float64]
+    tof_days: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        return len(self.tof_days)
+
+    @property
+    def n_asteroids(self) -> int:
+        """Number of bodies, the start included."""
+        return len(self.rows)
+
+    @property
+    def t_arr_mjd2000(self) -> NDArray[np.float64]:
+        """(n,) arrival epochs."""
+        return self.t_dep_mjd2000 + self.tof_days
+
+    @property
+    def duration_days(self) -> float:
+        """Time from the first departure to the last arrival."""
+        return float(self.t_arr_mjd2000[-1] - self.t_dep_mjd2000[0])
+
+    @classmethod
+    def from_tour(cls, problem: Problem, tour: Tour) -> Self:
+        """Read sequence and timetable off a tour of this problem, with one leg or more.
+
+        Raises
+        ------
+        InputError
+            A body of the tour is not in the problem's catalogue.
+        """
+        return cls(
+            rows=problem.catalogue.rows_of([body.id for body in tour.bodies]).astype(np.intp),
+            t_dep_mjd2000=np.array([leg.t_dep_mjd2000 for leg in tour.legs]),
+            tof_days=np.array([leg.tof_days for leg in tour.legs]),
+        )
+
+    def legs(self, problem: Problem, m0: ArrayLike) -> Legs:
+        """Return the n legs at the given initial masses in kg.
+
+        Their dry mass is zero: a timetable under construction may use more
+        propellant than there is, and whoever builds it keeps the account.
+        """
+        catalogue, craft = problem.catalogue, problem.spacecraft
+        return Legs(
+            rv_dep=catalogue.states_at(self.rows[:-1], self.t_dep_mjd2000),
+            rv_arr=catalogue.states_at(self.rows[1:], self.t_arr_mjd2000),
+            tof_days=self.tof_days,
+            m0=m0,
+            thrust=craft.thrust,
+            isp=craft.isp,
+            m_dry=0.0,
+        )
+
+    def part(self, first: int, last: int) -> Self:
+        """Return the bodies from one position to another, both included, and their legs."""
+        return type(self)(
+            self.rows[first : last + 1],
+            self.t_dep_mjd2000[first:last],
+            self.tof_days[first:last],
+        )
