@@ -96,6 +96,18 @@ def test_the_default_model_knows_what_a_leg_costs(default):
     assert default.final_mass(leg) == pytest.approx(solved.m_final, rel=0.01)
 
 
+def test_a_model_that_starts_from_another_keeps_its_final_masses(default, flown):
+    pytest.importorskip("torch")
+    from feasibility.learning.margin.train import MarginRecipe, train_margin
+
+    recipe = MarginRecipe(epochs=0, batch=100, device="cpu", threads=1)
+    model = train_margin([flown], recipe, start=default.artefact)
+    legs = flown.legs.take(np.arange(50))
+    np.testing.assert_array_equal(
+        FeasibilityClassifier(model).final_mass(legs), default.final_mass(legs)
+    )
+
+
 def test_hardly_a_leg_with_propellant_is_an_error(default):
     with pytest.raises(InputError, match="minimum propellant"):
         trained(default.artefact, labelled_dataset())

@@ -124,7 +124,8 @@ def train_margin(
 
     One that starts from another keeps the standardisation and the domain of that one, the latter
     widened by the new legs, and its weights where training does not improve them on the
-    validation part. Calibration is always that of the new legs.
+    validation part; its net for the final mass stays as it is. Calibration is always that of the
+    new legs.
 
     Parameters
     ----------
@@ -213,6 +214,7 @@ def train_margin(
         # Few calibration legs see few outliers: what was needed before is needed still.
         known = first_quick["settled"]
         settled = np.array([min(settled[0], known[0]), max(settled[1], known[1])])
+    final_mass = {} if start is None else start.section("final_mass")
     return Artefact(
         kind="margin",
         feature_set=FEATURE_SET,
@@ -225,6 +227,7 @@ def train_margin(
             "domain/low": low,
             "domain/high": high,
             **{f"calibration/{name}": array for name, array in table.items()},
+            **{f"final_mass/{name}": array for name, array in final_mass.items()},
             "calibration/positive_scores": boundary_scores(
                 Calibration(table), residual, expected, np.random.default_rng([recipe.seed, 1])
             ),
