@@ -12,6 +12,7 @@ from feasibility import InputError, Spacecraft
 from seqsearch.config import (
     CatalogueTable,
     Config,
+    FleetTable,
     MissionTable,
     ProblemTable,
     SpacecraftTable,
@@ -157,6 +158,7 @@ def test_the_page_on_problems_names_every_key_and_its_example_can_be_read(tmp_pa
         "mission": MissionTable,
         "catalogue": CatalogueTable,
         "gtoc5": Gtoc5Rules,
+        "fleet": FleetTable,
         "search": SearchSettings,
     }
     assert set(tables) == {field.name for field in msgspec.structs.fields(Config)}
