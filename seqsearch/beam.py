@@ -232,13 +232,13 @@ class _Search:
         return SearchResult(self._best_tour(), state.tree, state.counters, stopped)
 
     def _begin_pass(self) -> None:
-        """Under a time limit, as many starts as the beam is going to be wide."""
+        """Under a time limit, about as many starts as the beam is going to be wide."""
         if self._pacer is None:
             return
         state = self._state
         self._pacer.begin_pass(state.pass_number)
         width = self._pacer.width(no_nodes(), state.settings, state.counters)
-        starts = max(width, self._settings.starts)
+        starts = max(width, min(2 * width, self._settings.starts))
         screen_legs = max(self._pacer.screen_legs(), self._settings.screen_legs)
         state.settings = state.settings.with_(
             beam_width=width, starts=starts, screen_legs=screen_legs
@@ -363,6 +363,8 @@ class _Search:
         """Return what draws this rank's audit; None without an audit or a pruner."""
         solves = self._state.settings.audit_per_rank
         if solves == 0 or self._pruner.pruners == ():
+            return None
+        if self._pacer is not None and not self._pacer.audits(self._state.counters):
             return None
         return RankSample(self._rng, len(self._state.counters), solves, self._audit_predictor)
 

@@ -29,7 +29,12 @@ _SCREEN_SHARE: Final = 0.05
 _SCREENED_LEG_S: Final = 5e-6
 """Share of a pass that is spent on the choice of starts, and what a leg costs there."""
 
-_NARROWEST: Final = 10
+_AUDIT_SHARE: Final = 0.1
+"""Share of the time that the audit may take."""
+
+_NARROWEST: Final = 60
+"""Beams narrower than this spend their time on what every rank costs, however narrow."""
+
 _RECENT: Final = 3
 
 
@@ -78,10 +83,16 @@ class Pacer:
         """
         recent = [record for record in counters if record.nodes][-_RECENT:]
         n_nodes = sum(record.nodes for record in recent)
-        cost_s = sum(record.seconds for record in recent) / n_nodes if n_nodes else _NODE_S
+        seconds = sum(record.seconds - record.seconds_audit for record in recent)
+        cost_s = seconds / n_nodes if n_nodes else _NODE_S
         left_s = max(0.0, self._end - time.monotonic())
         affordable = left_s / (max(cost_s, 1e-6) * self._ranks_left(nodes, settings))
         return int(np.clip(affordable, _NARROWEST, settings.max_beam_width))
+
+    def audits(self, counters: Sequence[RankCounters]) -> bool:
+        """Tell whether there is time for an audit at the next rank."""
+        spent_s = sum(record.seconds_audit for record in counters)
+        return spent_s < _AUDIT_SHARE * sum(record.seconds for record in counters)
 
     def _ranks_left(self, nodes: Nodes, settings: SearchSettings) -> float:
         """Return about how many more legs there will be time for, at the pace so far."""

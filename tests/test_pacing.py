@@ -49,20 +49,29 @@ def test_the_beam_is_as_wide_as_the_time_left_can_pay_for(clock):
     clock[0] += 10.0
     assert pacer.width(nodes, settings, _counters(100, 0.01)) == pytest.approx(250, abs=1)
     assert pacer.width(nodes, settings, _counters(100, 1e-5)) == settings.max_beam_width
-    assert pacer.width(nodes, settings, _counters(100, 10.0)) == 10
+    assert pacer.width(nodes, settings, _counters(100, 10.0)) == 60
 
 
 def test_passes_grow_and_the_last_one_takes_what_is_left(clock):
     problem = small_problem()
     pacer = Pacer(problem, Deadline(600.0))
     settings = small_settings(max_beam_width=10**6)
+    # With one rank to come and half a second a node, widths are twice the seconds.
     nodes = _nodes(problem, 1, problem.max_duration_days / 2, 1700.0)
     seconds = []
     for pass_number in (1, 2, 3):
         pacer.begin_pass(pass_number)
-        seconds.append(pacer.width(nodes, settings, _counters(10, 1.0)))
+        seconds.append(pacer.width(nodes, settings, _counters(10, 0.5)) / 2)
         clock[0] += seconds[-1]
     assert seconds == pytest.approx([40, 120, 440], abs=2)
+
+
+def test_the_audit_takes_a_tenth_of_the_time(clock):
+    pacer = Pacer(small_problem(), Deadline(60.0))
+    records = [RankCounters(pass_number=1, rank=1, nodes=9, seconds=10.0)]
+    assert pacer.audits(records)
+    records[0].seconds_audit = 2.0
+    assert not pacer.audits(records)
 
 
 def test_what_ran_out_first_weighs_more_in_the_next_pass():
