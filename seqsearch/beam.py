@@ -241,7 +241,10 @@ class _Search:
         starts = max(width, min(2 * width, self._settings.starts))
         screen_legs = max(self._pacer.screen_legs(), self._settings.screen_legs)
         state.settings = state.settings.with_(
-            beam_width=width, starts=starts, screen_legs=screen_legs
+            beam_width=width,
+            starts=starts,
+            screen_legs=screen_legs,
+            start_epochs=self._pacer.start_epochs(self._settings),
         )
 
     def _make_ranking(self) -> Ranking:

@@ -30,7 +30,11 @@ _SCREENED_LEG_S: Final = 5e-6
 """Share of a pass that is spent on the choice of starts, and what a leg costs there."""
 
 _AUDIT_SHARE: Final = 0.1
-"""Share of the time that the audit may take."""
+_AUDIT_S: Final = 2.0
+"""Share of the time that the audit may take, and what one takes."""
+
+_EPOCH_S: Final = 0.2
+"""What it takes to look at all neighbourhoods at one epoch."""
 
 _NARROWEST: Final = 60
 """Beams narrower than this spend their time on what every rank costs, however narrow."""
@@ -67,6 +71,11 @@ class Pacer:
         """Return how many legs can be screened for starts in this pass."""
         return int(_SCREEN_SHARE * max(0.0, self._end - time.monotonic()) / _SCREENED_LEG_S)
 
+    def start_epochs(self, settings: SearchSettings) -> int:
+        """Return at how many epochs there is time to look for starts."""
+        affordable = _SCREEN_SHARE * max(0.0, self._end - time.monotonic()) / _EPOCH_S
+        return int(np.clip(affordable, min(4, settings.start_epochs), settings.start_epochs))
+
     def width(
         self, nodes: Nodes, settings: SearchSettings, counters: Sequence[RankCounters]
     ) -> int:
@@ -92,7 +101,7 @@ class Pacer:
     def audits(self, counters: Sequence[RankCounters]) -> bool:
         """Tell whether there is time for an audit at the next rank."""
         spent_s = sum(record.seconds_audit for record in counters)
-        return spent_s < _AUDIT_SHARE * sum(record.seconds for record in counters)
+        return spent_s + _AUDIT_S < _AUDIT_SHARE * sum(record.seconds for record in counters)
 
     def _ranks_left(self, nodes: Nodes, settings: SearchSettings) -> float:
         """Return about how many more legs there will be time for, at the pace so far."""

@@ -68,7 +68,7 @@ def test_passes_grow_and_the_last_one_takes_what_is_left(clock):
 
 def test_the_audit_takes_a_tenth_of_the_time(clock):
     pacer = Pacer(small_problem(), Deadline(60.0))
-    records = [RankCounters(pass_number=1, rank=1, nodes=9, seconds=10.0)]
+    records = [RankCounters(pass_number=1, rank=1, nodes=9, seconds=30.0)]
     assert pacer.audits(records)
     records[0].seconds_audit = 2.0
     assert not pacer.audits(records)
