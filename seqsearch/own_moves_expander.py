@@ -20,8 +20,8 @@ from seqsearch.ranking import Ranking
 from seqsearch.settings import SearchSettings
 from seqsearch.tour_problem import TourProblem
 
-_SOLVED: Final = 4.0
-"""Hops that are optimised, for each node that can go on: predicted masses are some percent off."""
+_SOLVED: Final = 2.0
+"""Hops that are optimised, for each node that can go on: predicted masses are a percent off."""
 
 
 @final

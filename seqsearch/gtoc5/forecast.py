@@ -116,14 +116,13 @@ class Gtoc5Forecast:
         found = self._ways(curves.take(best), lambda pair, tof: legs(best[pair], tof))
         if found is None:
             return None
-        pair, tof, level = found
+        pair, tof = found
         rows = target[best[pair]]
         return Visits(
             target=rows,
             fly_by_days=np.zeros(len(rows)),
             velocity=self._launch_velocity(row, t, rows, tof),
             tof_days=tof,
-            log_margin=level,
         )
 
     def hops(self, row: int, t: float, mass: float, visited: _Rows) -> Visits | None:
@@ -175,14 +174,13 @@ class Gtoc5Forecast:
         found = self._ways(curves.take(way), lambda k, tof: legs(way[k], tof))
         if found is None:
             return None
-        k, tof, level = found
+        k, tof = found
         chosen = way[k]
         return Visits(
             target=target[pair[chosen]],
             fly_by_days=wait[course[chosen]],
             velocity=velocity[course[chosen]],
             tof_days=tof,
-            log_margin=level,
         )
 
     def fly_by_days(self, row: int, t: float, mass: float) -> _Array:
@@ -273,8 +271,8 @@ class Gtoc5Forecast:
 
     def _ways(
         self, curves: MarginCurves, legs: Callable[[_Rows, _Array], Legs]
-    ) -> tuple[_Rows, _Array, _Array] | None:
-        """Return pairs, flight times and margins at each level, by good answers; None for none."""
+    ) -> tuple[_Rows, _Array] | None:
+        """Return pairs and flight times at each level of margin, by good answers, or None."""
         shortest = curves.shortest(_LEVELS[0])
         known = np.flatnonzero(np.isfinite(shortest))
         if len(known) == 0:
@@ -286,7 +284,7 @@ class Gtoc5Forecast:
         curves = curves.corrected(shortest, answer)
         times = np.column_stack([curves.shortest(level) for level in _LEVELS])
         k, level = np.nonzero(np.isfinite(times))
-        return (known[k], times[k, level], np.asarray(_LEVELS)[level]) if len(k) else None
+        return (known[k], times[k, level]) if len(k) else None
 
     def _log_margin(self, legs: Legs) -> _Array:
         self.questions += len(legs)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from feasibility import InputError, Spacecraft, optimise
 from feasibility.orbits import Catalogue, earth
-from feasibility.pruners.predictor import LegPredictor, bounded_final_mass
+from feasibility.pruners.predictor import LegPredictor
 from feasibility.sims_flanagan import solve_max_initial_mass
 from seqsearch.expansion import Candidates
 from seqsearch.forecast import in_threads
@@ -179,13 +179,14 @@ class Gtoc5Problem:
             return None
         parent = np.full(len(visits), k)
         hops = self._chains(nodes, parent, np.full(len(visits), t), visits, launch=launch)
-        m_final = bounded_final_mass(hops.stages[-1], np.exp(visits.log_margin))
+        m_final = predictor.final_mass(hops.stages[-1])
+        known = np.isfinite(m_final)
         first = t if launch else float(nodes.t_first_mjd2000[k])
-        within = self._leaves_room(hops.t_arr_mjd2000 - first, m_final)
+        within = known & self._leaves_room(hops.t_arr_mjd2000 - first, m_final)
         if not within.any():
             return None
         candidates = Candidates(parent, visits.target, hops).take(within)
-        return Proposal(candidates, m_final[within], forecast.questions)
+        return Proposal(candidates, m_final[within], forecast.questions + len(hops))
 
     def hops(
         self,
@@ -215,7 +216,7 @@ class Gtoc5Problem:
             least_m_s=0.0 if launch else speed,
             most_m_s=rules.launch_speed_max_m_s if launch else speed,
         )
-        visits = Visits(target, wait, velocity, tof_days - wait, np.zeros(n))
+        visits = Visits(target, wait, velocity, tof_days - wait)
         return self._chains(nodes, parent, t_dep_mjd2000, visits, launch=launch)
 
     def closing(self, row: int, t_mjd2000: float, mass: float, /) -> tuple[FlownLeg, ...]:

@@ -27,15 +27,12 @@ class Visits:
         that of the launch or of the fly-by.
     tof_days : (n,) float64
         Time of the transfer.
-    log_margin : (n,) float64
-        Predicted log(m*/m0) of the transfer.
     """
 
     target: NDArray[np.intp]
     fly_by_days: _Array
     velocity: _Array
     tof_days: _Array
-    log_margin: _Array
 
     def __len__(self) -> int:
         return len(self.target)
