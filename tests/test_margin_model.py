@@ -287,7 +287,7 @@ def test_the_final_mass_is_that_of_the_solver_or_of_full_thrust(default, legs):
 
 def test_threads_change_no_bit_of_the_answers(default, legs):
     many = Legs.concatenate(
-        [legs.take(np.random.default_rng(k).permutation(600)) for k in range(9)]
+        [legs.take(np.random.default_rng(k).permutation(600)) for k in range(16)]
     )
     probability, inside = default.assess(many)
     for threads in (2, 3):

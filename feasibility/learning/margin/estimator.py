@@ -28,7 +28,7 @@ _Array = NDArray[np.float64]
 _UNKNOWN: Final = 0.5
 """Probability where no features exist, so that nothing is known."""
 
-_LEGS_AT_A_TIME: Final = 2048
+_LEGS_AT_A_TIME: Final = 4096
 """Legs whose features are in the processor's cache at a time; the work of one thread."""
 
 
