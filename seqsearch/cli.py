@@ -136,7 +136,7 @@ def _parser() -> argparse.ArgumentParser:
         description=(
             "Integrate every leg of a run's tour with scipy's DOP853 between impulses and check "
             "end states (1000 km, 1 m/s), throttles, masses, stays, duplicates, window and "
-            "duration; for GTOC5 also launch, fly-bys and drops. Exit code 0 if all hold, 1 if not."
+            "duration; for GTOC5 also launch, fly-bys and drops. Exit code 0 if all hold, else 1."
         ),
     )
     verify.add_argument("path", metavar="RUN", help="run folder, or a sequence.json")
