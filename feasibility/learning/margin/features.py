@@ -10,7 +10,7 @@ from feasibility.legs import Legs
 
 _Array = NDArray[np.float64]
 
-FEATURE_SET: Final = "margin-1"
+FEATURE_SET: Final = "margin-2"
 """Name of this set of features in trained models."""
 
 _GEOMETRY: Final = (
