@@ -26,7 +26,9 @@ from seqsearch.tour import Tour
 
 _QUICK_ITERATIONS: Final = 5
 _THOROUGH_ITERATIONS: Final = 12
-_FINAL_ITERATIONS: Final = 40
+_GROWTH_ITERATIONS: Final = 30
+"""A tour that has just grown is far from its best timetable."""
+
 
 _HOPELESS_DAYS: Final = 80.0
 """After the quick iterations, how far behind the tour it came from an exchange is given up."""
@@ -222,7 +224,8 @@ def try_move(move: _Move) -> Retimed | None:
     best = min(found, key=lambda retimed: retimed.merit_days)
     if not move.grows and best.merit_days > move.origin.merit_days + _HOPELESS_DAYS:
         return None
-    return retime(move.problem, best.flight.itinerary, max_iterations=_THOROUGH_ITERATIONS)
+    iterations = _GROWTH_ITERATIONS if move.grows else _THOROUGH_ITERATIONS
+    return retime(move.problem, best.flight.itinerary, max_iterations=iterations)
 
 
 @final
