@@ -29,7 +29,6 @@ _Array = NDArray[np.float64]
 
 _TWO_PI = 2.0 * math.pi
 _MAX_ITERATIONS = 100
-_LAST_STEP = 1e-6
 _EPS = 2.220446049250313e-16
 # Below this |beta s^2| the closed forms of G2 and G3 lose digits, and the series wins.
 _SERIES_LIMIT = 1.0
@@ -164,11 +163,7 @@ def solve_kepler(
         s = s - 5.0 * gap / (slope + 2.0 * root)
         if not (low < s < high):
             s = 0.5 * (low + high) if high < np.inf else 2.0 * previous
-        if (
-            # Of third order: after a step this small the error is far below rounding.
-            (abs(s - previous) <= _LAST_STEP * s and abs(gap * curvature) <= _LAST_STEP * slope**2)
-            or low >= high * (1.0 - 2.0 * _EPS)
-        ):
+        if abs(s - previous) <= 2.0 * _EPS * s or low >= high * (1.0 - 2.0 * _EPS):
             g1, g2, g3 = g_functions(s, beta)
             break
     s = sign * s

@@ -36,7 +36,7 @@ _Scratch = tuple[_Array, _Array, _Array]
 _MAX_EVALUATIONS = 80
 _TOLERANCE = 1e-12
 _SECANT_TOLERANCE = 1e-11
-_PARABOLA_TOLERANCE = 1e-11
+_PARABOLA_TOLERANCE = 1e-13
 
 
 @kernel
