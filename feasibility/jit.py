@@ -28,7 +28,15 @@ def kernel(function: _F) -> _F:
 
     The kernel works on bare arrays and numbers; it validates nothing.
     """
-    return _compiled(function, fastmath=False)
+    return _compiled(function)
+
+
+def inner_kernel(function: _F) -> _F:
+    """Compile as `kernel` does what only other kernels call; it takes less time.
+
+    The wrapper that unpacks Python's arguments is missing, so Python must not call it.
+    """
+    return _compiled(function, no_cpython_wrapper=True)
 
 
 def summing_kernel(function: _F) -> _F:
@@ -39,10 +47,14 @@ def summing_kernel(function: _F) -> _F:
     return _compiled(function, fastmath={"reassoc", "contract", "nsz"})
 
 
-def _compiled(function: _F, fastmath: bool | set[str]) -> _F:
-    compiled: Any = numba.njit(
-        cache=True, nogil=True, error_model="numpy", fastmath=fastmath
-    )(function)
+def _compiled(function: _F, **options: bool | set[str]) -> _F:
+    # The wrapper options are missing from numba's type hints.
+    njit: Any = numba.njit
+    # No cfunc wrapper: nothing calls kernels through C pointers.
+    compile_as: Any = njit(
+        cache=True, nogil=True, error_model="numpy", no_cfunc_wrapper=True, **options
+    )
+    compiled: Any = compile_as(function)
     # Private names of numba, so absence must do no harm; test_kernel_cache would tell.
     index: Any = getattr(getattr(compiled, "_cache", None), "_cache_file", None)
     if index is not None and hasattr(index, "_source_stamp"):

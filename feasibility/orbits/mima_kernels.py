@@ -36,6 +36,7 @@ _Scratch = tuple[_Array, _Array, _Array]
 _MAX_EVALUATIONS = 80
 _TOLERANCE = 1e-12
 _SECANT_TOLERANCE = 1e-11
+_PARABOLA_TOLERANCE = 1e-13
 
 
 @kernel
@@ -208,9 +209,12 @@ def mima2_acceleration(
     slope = _mima_slope(dv1, dv2, 1.0 - t)
     f = np.nan
     mean = np.nan
+    f_before = np.nan
+    mean_before = np.nan
     for _ in range(_MAX_EVALUATIONS):
         x = x1 + t * (x2 - x1)
         a1, a2 = _accelerations(x, rv, tof, mu, rhs, end, scratch)
+        f_first, mean_first = f_before, mean_before
         f_before, mean_before = f, mean
         f = (a1 - a2) / (a1 + a2)
         mean = 0.5 * (a1 + a2)
@@ -219,6 +223,12 @@ def mima2_acceleration(
         if abs(f * f_before) < _SECANT_TOLERANCE:
             # A secant step from here errs by the product of the two: evaluating it is not needed.
             mean += (mean - mean_before) * f / (f_before - f)
+            break
+        if abs(f * f_before * f_first) < _PARABOLA_TOLERANCE:
+            # Nor is the next point where a parabola through the last three says enough.
+            slope = (mean - mean_before) / (f - f_before)
+            bend = (slope - (mean_before - mean_first) / (f_before - f_first)) / (f - f_first)
+            mean += f * (f_before * bend - slope)
             break
         if (f > 0.0) == (f1 > 0.0):
             x3, f3 = x1, f1

@@ -59,8 +59,9 @@ def fast_max_initial_mass(
     -------
     LegSolutions
         n rows. ``start`` is 0 to 4 for the nearest number of turns and 1, -1, 2, -2
-        turns beside it, 5 to 20 for bent paths, 21 for a random one, 100 and above for
-        the reference's starts; ``seconds`` is the batch's time shared out evenly.
+        turns beside it, 5 to 20 for bent paths, 21 for a random one, 22 for one from
+        the best solution, disturbed, 100 and above for the reference's
+        starts; ``seconds`` is the batch's time shared out evenly.
     """
     from feasibility.sims_flanagan.fast_maximum_kernels import maximum_batch
 

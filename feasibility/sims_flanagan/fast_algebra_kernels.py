@@ -9,12 +9,12 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.jit import kernel
+from feasibility.jit import inner_kernel
 
 _Array = NDArray[np.float64]
 
 
-@kernel
+@inner_kernel
 def cholesky(a: _Array, lower: _Array) -> bool:
     """Write the lower Cholesky factor of the (6, 6) matrix `a`; return whether it exists."""
     for i in range(6):
@@ -31,7 +31,7 @@ def cholesky(a: _Array, lower: _Array) -> bool:
     return True
 
 
-@kernel
+@inner_kernel
 def solve_lower(lower: _Array, b: _Array) -> None:
     """Overwrite `b` (6,) with the solution of L x = b."""
     for i in range(6):
@@ -41,7 +41,7 @@ def solve_lower(lower: _Array, b: _Array) -> None:
         b[i] = total / lower[i, i]
 
 
-@kernel
+@inner_kernel
 def solve_lower_transposed(lower: _Array, b: _Array) -> None:
     """Overwrite `b` (6,) with the solution of L^T x = b."""
     for i in range(5, -1, -1):
@@ -51,7 +51,7 @@ def solve_lower_transposed(lower: _Array, b: _Array) -> None:
         b[i] = total / lower[i, i]
 
 
-@kernel
+@inner_kernel
 def multiply_lower_transposed(lower: _Array, b: _Array) -> None:
     """Overwrite `b` (6,) with L^T b."""
     for i in range(6):
@@ -61,7 +61,7 @@ def multiply_lower_transposed(lower: _Array, b: _Array) -> None:
         b[i] = total
 
 
-@kernel
+@inner_kernel
 def norm6(a: _Array) -> float:
     """Return the Euclidean norm of a 6-vector."""
     total = 0.0
@@ -70,7 +70,7 @@ def norm6(a: _Array) -> float:
     return math.sqrt(total)
 
 
-@kernel
+@inner_kernel
 def divide(a: _Array, b: _Array, quotient: _Array) -> bool:
     """Write a b^-1 of (6, 6) matrices by Gauss elimination on rows of b^T; destroys both."""
     # Solve q b = a, column by column of b: column operations on the stacked [b; a].

@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.jit import kernel
+from feasibility.jit import inner_kernel
 from feasibility.orbits.kepler_kernels import propagate, propagate_stm
 from feasibility.sims_flanagan.fast_algebra_kernels import (
     multiply_lower_transposed,
@@ -31,7 +31,7 @@ from feasibility.sims_flanagan.fast_workspace_kernels import (
 _Array = NDArray[np.float64]
 
 
-@kernel
+@inner_kernel
 def shoot(x0: _Array, dv: _Array, n: int, dt: float, x: _Array) -> None:
     """Write into `x` the end of the arc from `x0` with the impulses `dv`."""
     propagate(x0, 0.5 * dt, 1.0, x)
@@ -42,7 +42,7 @@ def shoot(x0: _Array, dv: _Array, n: int, dt: float, x: _Array) -> None:
         propagate(x, dt if i < n - 1 else 0.5 * dt, 1.0, x)
 
 
-@kernel
+@inner_kernel
 def shoot_stm(x0: _Array, dv: _Array, n: int, dt: float, x: _Array, stm: _Array) -> None:
     """As `shoot`; also writes the transition matrix (n, 6, 6) of each arc after an impulse."""
     propagate(x0, 0.5 * dt, 1.0, x)
@@ -53,7 +53,7 @@ def shoot_stm(x0: _Array, dv: _Array, n: int, dt: float, x: _Array, stm: _Array)
         propagate_stm(x, dt if i < n - 1 else 0.5 * dt, 1.0, x, stm[i])
 
 
-@kernel
+@inner_kernel
 def sensitivities(
     stm: _Array, end_jacobian: _Array, n: int, b: _Array, m: _Array, m_next: _Array
 ) -> None:
@@ -75,7 +75,7 @@ def sensitivities(
                 b[k, i, j] = m[i, 3 + j]
 
 
-@kernel
+@inner_kernel
 def linearise(
     x0: _Array, dv: _Array, n: int, dt: float, target: _Array, w: Workspace, gap: _Array
 ) -> float:
@@ -93,7 +93,7 @@ def linearise(
     return norm6(gap)
 
 
-@kernel
+@inner_kernel
 def subtract(b: _Array, gap: _Array, fraction: float, n: int, dv: _Array) -> None:
     """Take a fraction of the least-norm impulses with sum b_i dv_i = gap off `dv`."""
     for i in range(n):
@@ -104,7 +104,7 @@ def subtract(b: _Array, gap: _Array, fraction: float, n: int, dv: _Array) -> Non
             dv[i, j] -= fraction * total
 
 
-@kernel
+@inner_kernel
 def whitened_gap(
     x0: _Array, dv: _Array, n: int, dt: float, target: _Array, w: Workspace, gap: _Array
 ) -> float:
@@ -117,7 +117,7 @@ def whitened_gap(
     return norm6(gap)
 
 
-@kernel
+@inner_kernel
 def close(
     x0: _Array,
     dv: _Array,
@@ -160,7 +160,7 @@ def close(
     return False
 
 
-@kernel
+@inner_kernel
 def restore(
     x0: _Array, dv: _Array, n: int, dt: float, target: _Array, tolerance: float, w: Workspace
 ) -> bool:
@@ -180,7 +180,7 @@ def restore(
     return size < tolerance
 
 
-@kernel
+@inner_kernel
 def improve(
     x0: _Array,
     dv: _Array,

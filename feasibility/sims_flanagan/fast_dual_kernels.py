@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.jit import kernel
+from feasibility.jit import inner_kernel
 from feasibility.sims_flanagan.fast_algebra_kernels import (
     cholesky,
     solve_lower,
@@ -35,7 +35,7 @@ _BACKWARD_LIMIT = 0.367
 _Array = NDArray[np.float64]
 
 
-@kernel
+@inner_kernel
 def full_thrust_profile(z: float, n: int, n_forward: int, y: _Array, slope: _Array) -> None:
     """Write impulses over exhaust velocity, y_i, at full thrust, and their derivative by z.
 
@@ -72,7 +72,7 @@ def full_thrust_profile(z: float, n: int, n_forward: int, y: _Array, slope: _Arr
             zi = yi
 
 
-@kernel
+@inner_kernel
 def z_of_impulses(dv: _Array, n: int, n_forward: int, c: float) -> float:
     """Return the smallest z = T dt / (m0 c) at which the impulses need no throttle above 1.
 
@@ -92,7 +92,7 @@ def z_of_impulses(dv: _Array, n: int, n_forward: int, c: float) -> float:
     return z
 
 
-@kernel
+@inner_kernel
 def whiten(b: _Array, n: int, gram: _Array, lower: _Array) -> bool:
     """Overwrite each b_i (6, 3) with L^-1 b_i, where L L^T = sum b_i b_i^T; return whether it can.
 
@@ -118,7 +118,7 @@ def whiten(b: _Array, n: int, gram: _Array, lower: _Array) -> bool:
     return True
 
 
-@kernel
+@inner_kernel
 def _primers(
     b: _Array, lam: _Array, n: int, thrust: _Array, pinned: _Array, primer: _Array, norm: _Array
 ) -> None:
@@ -147,7 +147,7 @@ def _primers(
             norm[i] = math.sqrt(norm[i] + eps2)
 
 
-@kernel
+@inner_kernel
 def _bound(
     norm: _Array, work: float, z: float, n: int, n_forward: int, c: float, y: _Array, slope: _Array
 ) -> float:
@@ -166,7 +166,7 @@ def _bound(
     return z
 
 
-@kernel
+@inner_kernel
 def _curvature(
     b: _Array,
     n: int,
@@ -218,7 +218,7 @@ def _curvature(
         h[i, i] += 1e-10 * trace
 
 
-@kernel
+@inner_kernel
 def _climb(
     b: _Array, gap: _Array, n: int, n_forward: int, c: float, lam: _Array, z: float, w: Workspace
 ) -> float:
@@ -292,7 +292,7 @@ def _climb(
     return z
 
 
-@kernel
+@inner_kernel
 def _turn_thrust(
     b: _Array, step: _Array, fraction: float, primer: _Array, norm: float, thrust: _Array
 ) -> None:
@@ -312,7 +312,7 @@ def _turn_thrust(
             thrust[j] /= size
 
 
-@kernel
+@inner_kernel
 def _pin_direction(b: _Array, lower: _Array, turned: _Array, u: _Array) -> None:
     """Move `u` (3,), shorter than 1, to the unit vector that the others make up for most cheaply.
 
@@ -363,7 +363,7 @@ def _pin_direction(b: _Array, lower: _Array, turned: _Array, u: _Array) -> None:
         u[0], u[1], u[2] = v0 / size, v1 / size, v2 / size
 
 
-@kernel
+@inner_kernel
 def least_thrust(
     b: _Array,
     gap: _Array,

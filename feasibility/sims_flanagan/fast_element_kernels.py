@@ -15,7 +15,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.jit import kernel
+from feasibility.jit import inner_kernel, kernel
 
 _TWO_PI = 2.0 * math.pi
 _STEP = 1e-5
@@ -23,7 +23,7 @@ _STEP = 1e-5
 _Array = NDArray[np.float64]
 
 
-@kernel
+@inner_kernel
 def wrap(angle: float) -> float:
     """Return the angle moved by whole turns into [-pi, pi]."""
     return angle - _TWO_PI * float(np.rint(angle / _TWO_PI))
@@ -111,7 +111,7 @@ def from_elements(e: _Array, x: _Array) -> None:
     x[5] = vx * f2 + vy * g2
 
 
-@kernel
+@inner_kernel
 def element_gap(x: _Array, target: _Array, gap: _Array) -> bool:
     """Write elements of `x` minus `target`, longitude wrapped; return False if not elliptic."""
     if not to_elements(x, gap):
@@ -122,7 +122,7 @@ def element_gap(x: _Array, target: _Array, gap: _Array) -> bool:
     return True
 
 
-@kernel
+@inner_kernel
 def element_derivatives(x: _Array, first: int, columns: _Array, scratch: _Array) -> bool:
     """Write d(elements)/dx for the components `first`, ... of x; return False if not elliptic.
 

@@ -5,12 +5,12 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.jit import kernel
+from feasibility.jit import inner_kernel
 
 _Array = NDArray[np.float64]
 
 
-@kernel
+@inner_kernel
 def rotation(x: _Array, frame: _Array) -> None:
     """Write the rows of the frame: radial, along-track, normal of the state `x`."""
     r = math.sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2])
@@ -27,7 +27,7 @@ def rotation(x: _Array, frame: _Array) -> None:
     frame[1, 2] = frame[2, 0] * frame[0, 1] - frame[2, 1] * frame[0, 0]
 
 
-@kernel
+@inner_kernel
 def scale_leg(
     rv0: _Array, rv1: _Array, mu: float, frame: _Array, x0: _Array, x1: _Array
 ) -> tuple[float, float]:
@@ -49,7 +49,7 @@ def scale_leg(
     return length, speed
 
 
-@kernel
+@inner_kernel
 def write_throttles(
     dv: _Array, z: float, c: float, n: int, frame: _Array, throttles: _Array
 ) -> float:
@@ -73,7 +73,7 @@ def write_throttles(
     return math.exp(-total)
 
 
-@kernel
+@inner_kernel
 def backward_impulse(z: float) -> float:
     """Return y with y exp(-y) = z, at most 1: a backward segment's impulse over c.
 
@@ -90,7 +90,7 @@ def backward_impulse(z: float) -> float:
     return y
 
 
-@kernel
+@inner_kernel
 def read_throttles(
     throttles: _Array, z: float, c: float, n: int, frame: _Array, dv: _Array
 ) -> None:

@@ -5,7 +5,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.jit import kernel
+from feasibility.jit import inner_kernel
+from feasibility.orbits.kepler_kernels import propagate
 from feasibility.sims_flanagan.fast_algebra_kernels import (
     cholesky,
     divide,
@@ -47,7 +48,7 @@ _TWO_PI = 2.0 * math.pi
 _Array = NDArray[np.float64]
 
 
-@kernel
+@inner_kernel
 def draw_path(
     e0: _Array, e1: _Array, tof: float, turns: int, n: int, shape: _Array, nodes: _Array
 ) -> float:
@@ -83,7 +84,29 @@ def draw_path(
     return float(e0[5] + travel)
 
 
-@kernel
+@inner_kernel
+def draw_arc(
+    x0: _Array, dv: _Array, e0: _Array, e1: _Array, dt: float, n: int, nodes: _Array, x: _Array
+) -> float:
+    """Write the elements before each impulse of an arc; return its mean longitude at arrival.
+
+    NaN where the arc leaves the ellipses.
+    """
+    longitude = e0[5] + 0.5 * dt * e0[0]
+    propagate(x0, 0.5 * dt, 1.0, x)
+    for i in range(n):
+        if not to_elements(x, nodes[i]):
+            return np.nan
+        nodes[i, 5] = longitude + wrap(nodes[i, 5] - longitude)
+        longitude = nodes[i, 5] + dt * nodes[i, 0]
+        for j in range(3):
+            x[3 + j] += dv[i, j]
+        propagate(x, dt, 1.0, x)
+    longitude -= 0.5 * dt * nodes[n - 1, 0]
+    return float(longitude - wrap(longitude - e1[5]))
+
+
+@inner_kernel
 def lifted_sweep(
     e0: _Array,
     e1: _Array,
@@ -222,7 +245,7 @@ def lifted_sweep(
     return z, change / size
 
 
-@kernel
+@inner_kernel
 def advance(nodes: _Array, dv: _Array, n: int, relax: float, count: int, w: Workspace) -> int:
     """Move nodes and impulses by Anderson's rule; return the number of steps remembered.
 
@@ -306,7 +329,7 @@ def advance(nodes: _Array, dv: _Array, n: int, relax: float, count: int, w: Work
     return count + 1
 
 
-@kernel
+@inner_kernel
 def inside(nodes: _Array, moved: _Array, fraction: float, n: int) -> bool:
     """Tell whether the moved nodes are moderate ellipses."""
     for i in range(n):

@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.jit import kernel
+from feasibility.jit import inner_kernel, kernel
 from feasibility.sims_flanagan.fast_algebra_kernels import (
     cholesky,
     multiply_lower_transposed,
@@ -59,7 +59,7 @@ _CLOSED = 1e-11
 _Array = NDArray[np.float64]
 
 
-@kernel
+@inner_kernel
 def clip_to_thrust(dv: _Array, n: int, n_forward: int, c: float, z: float, cap: _Array) -> float:
     """Shorten impulses to full thrust, masses followed from z = T dt / (m0 c); write the bounds.
 
@@ -78,7 +78,7 @@ def clip_to_thrust(dv: _Array, n: int, n_forward: int, c: float, z: float, cap: 
     return total
 
 
-@kernel
+@inner_kernel
 def restore_bounded(
     x0: _Array,
     dv: _Array,
@@ -103,7 +103,7 @@ def restore_bounded(
     return False
 
 
-@kernel
+@inner_kernel
 def _correct_bounded(
     x0: _Array,
     dv: _Array,
@@ -169,7 +169,7 @@ def _correct_bounded(
     return False
 
 
-@kernel
+@inner_kernel
 def _dual_value(
     b: _Array,
     total: _Array,
@@ -199,7 +199,7 @@ def _dual_value(
     return value
 
 
-@kernel
+@inner_kernel
 def least_propellant(
     b: _Array, total: _Array, lam: _Array, n: int, sharpness: float, linear: _Array, w: Workspace
 ) -> float:
@@ -289,7 +289,7 @@ def least_propellant(
     return math.sqrt(missing) / norm6(total)
 
 
-@kernel
+@inner_kernel
 def set_thresholds(
     linear: _Array, n: int, n_forward: int, c: float, norm: _Array, threshold: _Array
 ) -> None:
@@ -309,7 +309,7 @@ def set_thresholds(
             gained += excess * y / max(1.0 - y, 0.1)
 
 
-@kernel
+@inner_kernel
 def minimise_one(
     x0: _Array, target: _Array, tof: float, c: float, z: float, n: int, dv: _Array, w: Workspace
 ) -> float:

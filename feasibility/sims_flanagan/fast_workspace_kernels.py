@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.jit import kernel
+from feasibility.jit import inner_kernel
 
 N_STARTS = 6
 """Paths that can be under way at once: five numbers of turns and one random path."""
@@ -18,8 +18,8 @@ MEMORY = 6
 """Steps that Anderson's rule remembers; at most 6, the size of the matrices at hand."""
 
 # Rows of Workspace.n3: per segment, three components.
-DV, TRIAL, LINEAR, RESIDUAL, PREVIOUS, PRIMER, TRIAL_PRIMER, THRUST = range(8)
-D_RESIDUAL = 8
+DV, TRIAL, LINEAR, RESIDUAL, PREVIOUS, PRIMER, TRIAL_PRIMER, THRUST, BEST = range(9)
+D_RESIDUAL = 9
 D_DV = D_RESIDUAL + MEMORY
 STARTS = D_DV + MEMORY
 # Rows of Workspace.n6: per segment, six components.
@@ -47,7 +47,7 @@ class Workspace(NamedTuple):
     s: NDArray[np.float64]
 
 
-@kernel
+@inner_kernel
 def make_workspace(n: int) -> Workspace:
     """Allocate a `Workspace` for legs of n segments."""
     return Workspace(
