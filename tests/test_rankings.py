@@ -59,17 +59,17 @@ def _nodes(problem, rows, depth, elapsed, mass) -> Nodes:
 def _brute_fronts(points):
     left = dict(enumerate(points))
     fronts = {}
-    for k in itertools.count():
-        if not left:
-            return [fronts[i] for i in range(len(points))]
+    while left:
         beaten = {
             i
             for i, p in left.items()
             if any(q[0] <= p[0] and q[1] <= p[1] and q != p for q in left.values())
         }
+        k = max(fronts.values(), default=-1) + 1
         for i in [i for i in left if i not in beaten]:
             fronts[i] = k
             del left[i]
+    return [fronts[i] for i in range(len(points))]
 
 
 @given(_points)

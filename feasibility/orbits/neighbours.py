@@ -12,8 +12,8 @@ from feasibility.errors import InputError
 from feasibility.orbits.catalogue import Catalogue
 
 _MAX_POINTS: Final = 5_000_000
-"""Points in all trees that are kept at a time: 400 MB, 5 years of 30-day buckets for 83 000 bodies,
-25 years for 16 000."""
+"""Points in all trees that are kept at a time: 400 MB, 5 years of 30-day buckets for 83 000
+bodies, 25 years for 16 000."""
 
 
 def orbital_metric(states: ArrayLike, reference_tof_days: float) -> NDArray[np.float64]:
