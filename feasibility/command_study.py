@@ -67,7 +67,11 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     )
     parser.add_argument("--seed", type=int, default=0, help="seed of legs and split (default: 0)")
     parser.add_argument("--workers", type=int, help="processes (default: one a core)")
-    parser.add_argument("--threads", type=int, help="threads of a network (default: one a core)")
+    parser.add_argument(
+        "--threads",
+        type=int,
+        help="threads of a network (default: one in bfloat16, else one a core)",
+    )
     parser.add_argument(
         "--device",
         choices=("cpu", "cuda", "auto"),
@@ -126,7 +130,7 @@ def _settings(options: argparse.Namespace, out: Path) -> "Settings":
         catalogue=options.catalogue,
         seed=options.seed,
         workers=options.workers or cores,
-        threads=options.threads or cores,
+        threads=options.threads,
         device=options.device,
         precision=options.precision,
     )

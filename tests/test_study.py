@@ -7,6 +7,7 @@ import json
 import math
 import shutil
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
@@ -19,7 +20,14 @@ from feasibility.cli import main
 from feasibility.dataset import Dataset
 from feasibility.learning.features import FEATURES
 from feasibility.learning.folds import pair_ids
-from feasibility.learning.study import EXPERIMENTS, fit, labels, optimisation, paper_values
+from feasibility.learning.study import (
+    EXPERIMENTS,
+    fit,
+    labels,
+    optimisation,
+    paper_values,
+    runner,
+)
 from feasibility.learning.study.cells import Cells
 from feasibility.learning.study.context import Context
 from feasibility.learning.study.data import N_FOLDS, StudyData
@@ -423,6 +431,15 @@ def test_presets_ask_for_what_exists(preset):
     assert max(map(max, preset.data_size.values())) < preset.legs
     assert set(preset.margin_sizes) <= set(preset.data_size["dnn1"])
     assert set(preset.n_features) == set(paper_values.TABLE_4)
+
+
+@pytest.mark.parametrize(
+    ("given", "precision", "expected"),
+    [(None, "bfloat16", 1), (None, "float32", 6), (3, "bfloat16", 3), (3, "float32", 3)],
+)
+def test_threads_follow_the_precision_unless_given(monkeypatch, given, precision, expected):
+    monkeypatch.setattr(runner.os, "cpu_count", lambda: 6)
+    assert runner._threads(Settings(TINY, Path("out"), threads=given), precision) == expected
 
 
 def test_large_training_sets_are_drawn_less_often():

@@ -177,7 +177,7 @@ _LAPTOP: Final = Preset(
     },
     comparison_seeds=3,
     large=400_000,
-    large_seeds=1,
+    large_seeds=3,
     n_features=_TABLE_4_COUNTS,
     n_features_rows=20_000,
     n_features_folds=3,
@@ -192,7 +192,7 @@ _LAPTOP: Final = Preset(
     tuning_epochs=10,
     tuning_workers=2,
     ranking_seeds=5,
-    label_legs=120,
+    label_legs=400,
     label_models=("ensemble", "tree"),
 )
 

@@ -52,8 +52,9 @@ class Settings:
         Seed of the legs and of the split.
     workers : int
         Processes of what runs in parallel.
-    threads : int
-        Threads of a network's training.
+    threads : int, optional
+        Threads of a network's training; by default one where it is in bfloat16, which a second
+        one hardly speeds up and waiting for it slows down, else one a core.
     device : str
         Where networks are trained: "cpu", "cuda" or "auto".
     precision : str
@@ -67,7 +68,7 @@ class Settings:
     catalogue: str | None = None
     seed: int = 0
     workers: int = 2
-    threads: int = 2
+    threads: int | None = None
     device: str = "cpu"
     precision: str = "auto"
 
@@ -123,7 +124,7 @@ def run_study(
         cells=Cells(settings.out / "cells", say),
         out=settings.out,
         workers=settings.workers,
-        threads=settings.threads,
+        threads=_threads(settings, record["recipe"]["precision"]),
         device=settings.device,
         precision=record["recipe"]["precision"],
         say=say,
@@ -239,7 +240,7 @@ def _open_record(settings: Settings, data: StudyData) -> dict[str, Any]:
             "data_given": settings.data is not None,
         },
         "workers": settings.workers,
-        "threads": settings.threads,
+        "threads": _threads(settings, precision),
         "device": settings.device,
         "provenance": provenance(),
         "training_versions": {name: metadata.version(name) for name in _TRAINING},
@@ -248,6 +249,12 @@ def _open_record(settings: Settings, data: StudyData) -> dict[str, Any]:
     }
     _write_record(settings.out, record)
     return record
+
+
+def _threads(settings: Settings, precision: str) -> int:
+    if settings.threads is not None:
+        return settings.threads
+    return 1 if precision == "bfloat16" else os.cpu_count() or 1
 
 
 def _write_record(out: Path, record: dict[str, Any]) -> None:
