@@ -173,7 +173,7 @@ _LAPTOP: Final = Preset(
         "svm": 30_000,
         "tree": 50_000,
         "dnn1": 400_000,
-        "dnn2": 100_000,
+        "dnn2": 400_000,
     },
     comparison_seeds=3,
     large=400_000,
