@@ -220,8 +220,8 @@ class ForecastExpander:
         if len(candidates) == 0 or deadline.passed():
             return None
         clock = time.perf_counter()
-        order = np.argsort(self._ranking.score(found, self._problem), kind="stable")
-        optimised = self._optimiser.run_all(candidates, order, settings, deadline)
+        promise = self._ranking.score(found, self._problem)
+        optimised = self._optimiser.run_all(candidates, promise, settings, deadline)
         counters.seconds_optimise = time.perf_counter() - clock
         return Expanded(candidates, optimised)
 

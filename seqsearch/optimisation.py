@@ -202,12 +202,12 @@ class LegOptimiser:
     def run_all(
         self,
         candidates: Candidates,
-        order: NDArray[np.intp],
+        promise: NDArray[np.float64],
         settings: SearchSettings,
         deadline: Deadline,
     ) -> Optimised:
-        """Optimise candidates in the given order, (n,) positions, up to `solves_per_rank`."""
-        rows = order[: settings.solves_per_rank]
+        """Optimise candidates up to `solves_per_rank`, those of the least `promise` (n,) first."""
+        rows = np.argsort(promise, kind="stable")[: settings.solves_per_rank]
         done: list[tuple[NDArray[np.intp], SolvedHops]] = []
         n_legs = n_hops = 0
         for chunk, solved in self._solve(candidates.hops, rows, settings.solver, deadline):

@@ -3,8 +3,6 @@
 import time
 from typing import Final, final
 
-import numpy as np
-
 from feasibility import AllOf
 from feasibility.pruners.predictor import LegPredictor
 from seqsearch.audit import RankSample
@@ -99,7 +97,7 @@ class OwnMovesExpander:
         if len(best) == 0 or deadline.passed():
             return None
         clock = time.perf_counter()
-        order = np.argsort(self._ranking.score(reachable, self._problem), kind="stable")
-        optimised = self._optimiser.run_all(best, order, settings, deadline)
+        promise = self._ranking.score(reachable, self._problem)
+        optimised = self._optimiser.run_all(best, promise, settings, deadline)
         counters.seconds_optimise = time.perf_counter() - clock
         return Expanded(best, optimised)
