@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.constants import DAY_S
-from feasibility.jit import kernel
+from feasibility.jit import inner_kernel, kernel
 
 N_COLUMNS: Final = 10
 ECCENTRICITY: Final = 0
@@ -28,7 +28,7 @@ AXIS_B: Final = 7
 _MAX_NEWTON_STEPS: Final = 60
 
 
-@kernel
+@inner_kernel
 def eccentric_anomaly(mean_anomaly: float, e: float) -> float:
     """Solve Kepler's equation for one ellipse; method as in `elements.mean_to_eccentric`."""
     turns = np.round(mean_anomaly / (2.0 * math.pi))

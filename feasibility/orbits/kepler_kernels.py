@@ -23,7 +23,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.jit import kernel
+from feasibility.jit import inner_kernel, kernel
 
 _Array = NDArray[np.float64]
 
@@ -34,7 +34,7 @@ _EPS = 2.220446049250313e-16
 _SERIES_LIMIT = 1.0
 
 
-@kernel
+@inner_kernel
 def g_functions(s: float, beta: float) -> tuple[float, float, float]:
     """Return G1, G2, G3 at the universal anomaly `s`.
 
@@ -74,7 +74,7 @@ def g_functions(s: float, beta: float) -> tuple[float, float, float]:
     return sine / k, -2.0 * half * half / beta, (x - sine) / (k * beta)
 
 
-@kernel
+@inner_kernel
 def _first_guess(dt: float, r0: float, eta0: float, beta: float, mu: float) -> float:
     """Return a first universal anomaly for 0 <= dt, at most half a period."""
     tau = dt / r0
@@ -109,7 +109,7 @@ def _first_guess(dt: float, r0: float, eta0: float, beta: float, mu: float) -> f
     return guess
 
 
-@kernel
+@inner_kernel
 def solve_kepler(
     dt: float, r0: float, eta0: float, beta: float, mu: float
 ) -> tuple[float, float, float, float, float]:
@@ -174,6 +174,20 @@ def solve_kepler(
     return s, sign * g1, g2, sign * g3, turns
 
 
+@inner_kernel
+def kepler_secular(s: float, g2: float, g3: float, turns: float, beta: float) -> float:
+    """Return 3 G5 - s G4 over all revolutions: by a series where the closed form loses digits."""
+    z = beta * s * s
+    if abs(z) < _SERIES_LIMIT:
+        term = s * s * s * s * s / 120.0
+        secular = -2.0 * term
+        for k in range(1, 9):
+            term *= -z / ((2 * k + 4) * (2 * k + 5))
+            secular -= (2 * k + 2) * term
+        return secular
+    return (s * g2 - 3.0 * (g3 + turns)) / beta
+
+
 @kernel
 def propagate(rv: _Array, dt: float, mu: float, out: _Array) -> None:
     """Write the state after `dt` of Keplerian motion.
@@ -208,26 +222,28 @@ def propagate(rv: _Array, dt: float, mu: float, out: _Array) -> None:
 
 
 @kernel
-def _propagate_stm(
-    rv: _Array, dt: float, mu: float, out: _Array, stm: _Array, velocity_rows: bool
-) -> None:
-    """See `propagate_stm`; the rows of the final velocity are optional."""
+def propagate_stm(rv: _Array, dt: float, mu: float, out: _Array, stm: _Array) -> None:
+    """Write the state after `dt` of Keplerian motion and its derivative.
+
+    Parameters
+    ----------
+    rv : (6,) float64, m and m/s
+        State; not changed unless it is also `out`.
+    dt : float, s
+        Of either sign, any number of revolutions.
+    mu : float, m3/s2
+    out : (6,) float64, m and m/s
+        Receives the final state; may be `rv` itself.
+    stm : (6, 6) float64
+        Receives d(out) / d(rv), rows by final state, SI.
+    """
     p0 = (rv[0], rv[1], rv[2])
     v0 = (rv[3], rv[4], rv[5])
     r0 = math.sqrt(p0[0] * p0[0] + p0[1] * p0[1] + p0[2] * p0[2])
     eta0 = p0[0] * v0[0] + p0[1] * v0[1] + p0[2] * v0[2]
     beta = 2.0 * mu / r0 - (v0[0] * v0[0] + v0[1] * v0[1] + v0[2] * v0[2])
     s, g1, g2, g3, turns = solve_kepler(dt, r0, eta0, beta, mu)
-    # 3 G5 - s G4 over all revolutions: a series where the closed form loses digits.
-    z = beta * s * s
-    if abs(z) < _SERIES_LIMIT:
-        term = s * s * s * s * s / 120.0
-        secular = -2.0 * term
-        for k in range(1, 9):
-            term *= -z / ((2 * k + 4) * (2 * k + 5))
-            secular -= (2 * k + 2) * term
-    else:
-        secular = (s * g2 - 3.0 * (g3 + turns)) / beta
+    secular = kepler_secular(s, g2, g3, turns, beta)
     c = mu * (mu * secular - dt * g2)
     one_f = mu * g2 / r0
     f = 1.0 - one_f
@@ -258,8 +274,6 @@ def _propagate_stm(
             stm[i, 3 + j] = rv_v0 * v0[j] + rv_p0 * p0[j]
         stm[i, i] += f
         stm[i, 3 + i] += g
-        if not velocity_rows:
-            continue
         vr_p0 = -dv[i] / r02 - mu * c * p[i] / (r * r2 * r0 * r02)
         vr_dv = -p[i] / r2 + ft * w / (mu * r)
         vr_p = -ft * p[i] / r2
@@ -274,31 +288,6 @@ def _propagate_stm(
     for i in range(3):
         out[i] = p[i]
         out[3 + i] = v[i]
-
-
-@kernel
-def propagate_stm(rv: _Array, dt: float, mu: float, out: _Array, stm: _Array) -> None:
-    """Write the state after `dt` of Keplerian motion and its derivative.
-
-    Parameters
-    ----------
-    rv : (6,) float64, m and m/s
-        State; not changed unless it is also `out`.
-    dt : float, s
-        Of either sign, any number of revolutions.
-    mu : float, m3/s2
-    out : (6,) float64, m and m/s
-        Receives the final state; may be `rv` itself.
-    stm : (6, 6) float64
-        Receives d(out) / d(rv), rows by final state, SI.
-    """
-    _propagate_stm(rv, dt, mu, out, stm, True)
-
-
-@kernel
-def propagate_position_stm(rv: _Array, dt: float, mu: float, out: _Array, stm: _Array) -> None:
-    """Do as `propagate_stm`, but write only the rows of the final position, 0 to 2, of `stm`."""
-    _propagate_stm(rv, dt, mu, out, stm, False)
 
 
 @kernel

@@ -20,7 +20,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.jit import kernel
+from feasibility.jit import inner_kernel, kernel
 
 _Array = NDArray[np.float64]
 
@@ -36,7 +36,7 @@ _PARABOLIC = 0.1
 _VERY_PARABOLIC = 1e-5
 
 
-@kernel
+@inner_kernel
 def _time_of_flight(x: float, lam: float, q: float, turns: float) -> tuple[float, float]:
     """Return T(x) and y; `q` is 1 - lambda^2, `turns` the number of revolutions times pi."""
     y = math.sqrt(lam * lam * x * x + q)
@@ -64,7 +64,7 @@ def _time_of_flight(x: float, lam: float, q: float, turns: float) -> tuple[float
     return (psi / root - x * q + lam * eta) / e, y
 
 
-@kernel
+@inner_kernel
 def _solve(
     x: float,
     low: float,
@@ -113,7 +113,7 @@ def _solve(
     return x
 
 
-@kernel
+@inner_kernel
 def _least_time(lam: float, q: float, turns: float) -> tuple[float, float]:
     """Return x and T where T(x) is least, for one revolution or more (Halley on T' = 0)."""
     lam3 = lam * lam * lam

@@ -26,12 +26,14 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.jit import kernel
-from feasibility.orbits.kepler_kernels import propagate_position_stm
+from feasibility.jit import inner_kernel, kernel
+from feasibility.orbits.kepler_kernels import kepler_secular, solve_kepler
 from feasibility.orbits.lambert_kernels import lambert
 
 _Array = NDArray[np.float64]
-_Scratch = tuple[_Array, _Array, _Array]
+# Of the Lambert arc at departure: distance, radial and transverse velocity, 2 mu / r - v^2.
+_Orbit = tuple[float, float, float, float]
+_Effect = tuple[float, float, float, float, float, float, float, float, float, float]
 
 _MAX_EVALUATIONS = 80
 _TOLERANCE = 1e-12
@@ -39,13 +41,13 @@ _SECANT_TOLERANCE = 1e-11
 _PARABOLA_TOLERANCE = 1e-13
 
 
-@kernel
+@inner_kernel
 def mass_from_acceleration(a: float, tof: float, thrust: float, exhaust_velocity: float) -> float:
     """Return the initial mass in kg whose mean acceleration at full thrust is `a` m/s2."""
     return 2.0 * thrust / (a * (1.0 + math.exp(-a * tof / exhaust_velocity)))
 
 
-@kernel
+@inner_kernel
 def mima_acceleration(dv1: _Array, dv2: _Array, tof: float) -> tuple[float, float]:
     """Return the acceleration of MIMA in m/s2 for two impulses (3,) m/s, and t1 / T.
 
@@ -72,7 +74,7 @@ def mima_acceleration(dv1: _Array, dv2: _Array, tof: float) -> tuple[float, floa
     return math.sqrt(dd + 2.0 * de / x + ee / (x * x)) / tof, x
 
 
-@kernel
+@inner_kernel
 def _mima_slope(dv1: _Array, dv2: _Array, x: float) -> float:
     """Return d/dx of (a1 - a2) / (a1 + a2) of MIMA at the switch x: MIMA2's, nearly."""
     ee = 0.0
@@ -92,70 +94,125 @@ def _mima_slope(dv1: _Array, dv2: _Array, x: float) -> float:
     return 2.0 * (a2 * slope1 - a1 * slope2) / ((a1 + a2) * (a1 + a2))
 
 
-@kernel
+@inner_kernel
+def _plane_stm(time: float, orbit: _Orbit, mu: float, tof: float) -> _Effect:
+    """Return how an acceleration at `time` acts at epoch 0, in the plane of the orbit.
+
+    The inverse of a state-transition matrix is its symplectic transpose, so it acts
+    through (-Phi_rv^T / T, Phi_rr^T): four numbers each, by rows, then what moves out of
+    the plane, -g / T and f. The matrix is that of `propagate_stm`, whose symbols these
+    are, with the position at epoch 0 on the x axis.
+    """
+    r0, vr, vt, beta = orbit
+    s, g1, g2, g3, turns = solve_kepler(time, r0, r0 * vr, beta, mu)
+    c = mu * (mu * kepler_secular(s, g2, g3, turns, beta) - time * g2)
+    one_f = mu * g2 / r0
+    f = 1.0 - one_f
+    g = r0 * g1 + r0 * vr * g2
+    x = f * r0 + g * vr
+    y = g * vt
+    r = math.sqrt(x * x + y * y)
+    ft = -mu * g1 / (r * r0)
+    one_gt = mu * g2 / r
+    dvx = ft * r0 - one_gt * vr
+    dvy = -one_gt * vt
+    vx = dvx + vr
+    vy = dvy + vt
+    bend = r0 * one_f
+    along = 1.0 / (r0 * r0)
+    rr_x = r / mu * dvx
+    rr_y = r / mu * dvy
+    rv_x = (bend * (x - r0) + c * vx) / mu
+    rv_y = (bend * y + c * vy) / mu
+    less = bend * r0 / mu
+    k = -1.0 / tof
+    return (
+        k * (rv_x * vr - less * dvx + g),
+        k * (rv_y * vr - less * dvy),
+        k * rv_x * vt,
+        k * (rv_y * vt + g),
+        rr_x * dvx + (bend * x + c * vx) * along + f,
+        rr_y * dvx + (bend * y + c * vy) * along,
+        rr_x * dvy,
+        rr_y * dvy + f,
+        k * g,
+        f,
+    )
+
+
+@inner_kernel
 def _accelerations(
-    x: float, rv: _Array, tof: float, mu: float, rhs: _Array, end: _Array, scratch: _Scratch
+    x: float, orbit: _Orbit, tof: float, mu: float, rhs: _Array, end: _Effect
 ) -> tuple[float, float]:
     """Return |a1| T and |a2| T for a switch at x T.
 
-    `rhs` (6,) and `end` (6, 3) are at epoch 0, positions divided by T.
+    `rhs` (6,) is at epoch 0, positions divided by T, the two components out of the plane last.
     """
-    work, state, stm = scratch
-    for i in range(6):
-        work[i, 6] = rhs[i]
-        for j in range(6):
-            work[i, j] = 0.0
-    # Simpson on both arcs: nodes 0, t1/2, t1, (t1 + T)/2, T; the inverse of a
-    # state-transition matrix is its symplectic transpose, so an acceleration at t
-    # acts at epoch 0 through (-Phi_rv^T, Phi_rr^T).
+    # Simpson on both arcs: nodes 0, t1/2, t1, (t1 + T)/2, T.
     first = x / 6.0
     second = (1.0 - x) / 6.0
-    for node in range(3):
-        if node == 0:
-            time, w1, w2 = 0.5 * x * tof, 4.0 * first, 0.0
-        elif node == 1:
-            time, w1, w2 = x * tof, first, second
-        else:
-            time, w1, w2 = 0.5 * (1.0 + x) * tof, 0.0, 4.0 * second
-        propagate_position_stm(rv, time, mu, state, stm)
-        for i in range(3):
-            for j in range(3):
-                position = -stm[j, 3 + i] / tof
-                velocity = stm[j, i]
-                work[i, j] += w1 * position
-                work[3 + i, j] += w1 * velocity
-                work[i, 3 + j] += w2 * position
-                work[3 + i, 3 + j] += w2 * velocity
-    for i in range(3):
-        work[3 + i, i] += first
-        for j in range(3):
-            work[i, 3 + j] += second * end[i, j]
-            work[3 + i, 3 + j] += second * end[3 + i, j]
-    # Gaussian elimination with partial pivoting.
-    for k in range(6):
-        pivot = k
-        for i in range(k + 1, 6):
-            if abs(work[i, k]) > abs(work[pivot, k]):
-                pivot = i
-        if pivot != k:
-            for j in range(k, 7):
-                work[k, j], work[pivot, j] = work[pivot, j], work[k, j]
-        inverse = 1.0 / work[k, k]
-        for i in range(k + 1, 6):
-            factor = work[i, k] * inverse
-            for j in range(k + 1, 7):
-                work[i, j] -= factor * work[k, j]
-    for k in range(5, -1, -1):
-        total = work[k, 6]
-        for j in range(k + 1, 6):
-            total -= work[k, j] * work[j, 6]
-        work[k, 6] = total / work[k, k]
-    a1 = math.sqrt(work[0, 6] ** 2 + work[1, 6] ** 2 + work[2, 6] ** 2)
-    a2 = math.sqrt(work[3, 6] ** 2 + work[4, 6] ** 2 + work[5, 6] ** 2)
-    return a1, a2
+    early = _plane_stm(0.5 * x * tof, orbit, mu, tof)
+    middle = _plane_stm(x * tof, orbit, mu, tof)
+    late = _plane_stm(0.5 * (1.0 + x) * tof, orbit, mu, tof)
+    a00 = first * (4.0 * early[0] + middle[0])
+    a01 = first * (4.0 * early[1] + middle[1])
+    a10 = first * (4.0 * early[2] + middle[2])
+    a11 = first * (4.0 * early[3] + middle[3])
+    a20 = first * (4.0 * early[4] + middle[4] + 1.0)
+    a21 = first * (4.0 * early[5] + middle[5])
+    a30 = first * (4.0 * early[6] + middle[6])
+    a31 = first * (4.0 * early[7] + middle[7] + 1.0)
+    a02 = second * (4.0 * late[0] + middle[0] + end[0])
+    a03 = second * (4.0 * late[1] + middle[1] + end[1])
+    a12 = second * (4.0 * late[2] + middle[2] + end[2])
+    a13 = second * (4.0 * late[3] + middle[3] + end[3])
+    a22 = second * (4.0 * late[4] + middle[4] + end[4])
+    a23 = second * (4.0 * late[5] + middle[5] + end[5])
+    a32 = second * (4.0 * late[6] + middle[6] + end[6])
+    a33 = second * (4.0 * late[7] + middle[7] + end[7])
+    # Cramer's rule by minors of the upper and the lower two rows.
+    s01 = a00 * a11 - a10 * a01
+    s02 = a00 * a12 - a10 * a02
+    s03 = a00 * a13 - a10 * a03
+    s12 = a01 * a12 - a11 * a02
+    s13 = a01 * a13 - a11 * a03
+    s23 = a02 * a13 - a12 * a03
+    c01 = a20 * a31 - a30 * a21
+    c02 = a20 * a32 - a30 * a22
+    c03 = a20 * a33 - a30 * a23
+    c12 = a21 * a32 - a31 * a22
+    c13 = a21 * a33 - a31 * a23
+    c23 = a22 * a33 - a32 * a23
+    inverse = 1.0 / (s01 * c23 - s02 * c13 + s03 * c12 + s12 * c03 - s13 * c02 + s23 * c01)
+    b0, b1, b2, b3 = rhs[0], rhs[1], rhs[2], rhs[3]
+    # Minors of the right-hand side with each column.
+    u0, u1, u2, u3 = (
+        b0 * a10 - b1 * a00,
+        b0 * a11 - b1 * a01,
+        b0 * a12 - b1 * a02,
+        b0 * a13 - b1 * a03,
+    )
+    d0, d1, d2, d3 = (
+        b2 * a30 - b3 * a20,
+        b2 * a31 - b3 * a21,
+        b2 * a32 - b3 * a22,
+        b2 * a33 - b3 * a23,
+    )
+    x0 = inverse * (u1 * c23 - u2 * c13 + u3 * c12 + s12 * d3 - s13 * d2 + s23 * d1)
+    x1 = inverse * (-u0 * c23 + u2 * c03 - u3 * c02 - s02 * d3 + s03 * d2 - s23 * d0)
+    x2 = inverse * (u0 * c13 - u1 * c03 + u3 * c01 + s01 * d3 - s03 * d1 + s13 * d0)
+    x3 = inverse * (-u0 * c12 + u1 * c02 - u2 * c01 - s01 * d2 + s02 * d1 - s12 * d0)
+    p1 = first * (4.0 * early[8] + middle[8])
+    p2 = second * (4.0 * late[8] + middle[8] + end[8])
+    v1 = first * (4.0 * early[9] + middle[9] + 1.0)
+    v2 = second * (4.0 * late[9] + middle[9] + end[9])
+    across = 1.0 / (p1 * v2 - p2 * v1)
+    z1 = across * (rhs[4] * v2 - rhs[5] * p2)
+    z2 = across * (rhs[5] * p1 - rhs[4] * v1)
+    return math.sqrt(x0 * x0 + x1 * x1 + z1 * z1), math.sqrt(x2 * x2 + x3 * x3 + z2 * z2)
 
 
-@kernel
+@inner_kernel
 def mima2_acceleration(
     rv: _Array,
     dv1: _Array,
@@ -163,8 +220,6 @@ def mima2_acceleration(
     tof: float,
     mu: float,
     rhs: _Array,
-    end: _Array,
-    scratch: _Scratch,
 ) -> float:
     """Return the acceleration of MIMA2 in m/s2.
 
@@ -183,7 +238,7 @@ def mima2_acceleration(
         Impulses at departure and arrival.
     tof : float, s
     mu : float, m3/s2
-    rhs, end, scratch : (6,), (6, 3) and the three of (6, 7), (6,), (6, 6) float64
+    rhs : (6,) float64
         Overwritten.
 
     Returns
@@ -191,16 +246,25 @@ def mima2_acceleration(
     float
         NaN where the search meets a singular system.
     """
-    _, state, stm = scratch
-    propagate_position_stm(rv, tof, mu, state, stm)
-    for i in range(3):
-        rhs[i] = 0.0
-        rhs[3 + i] = dv1[i]
-        for j in range(3):
-            end[i, j] = -stm[j, 3 + i] / tof
-            end[3 + i, j] = stm[j, i]
-            rhs[i] += end[i, j] * dv2[j]
-            rhs[3 + i] += end[3 + i, j] * dv2[j]
+    # The plane of the arc: in it and across it, motion is independent to first order.
+    r0 = math.sqrt(rv[0] * rv[0] + rv[1] * rv[1] + rv[2] * rv[2])
+    x, y, z = rv[0] / r0, rv[1] / r0, rv[2] / r0
+    vr = x * rv[3] + y * rv[4] + z * rv[5]
+    tx, ty, tz = rv[3] - vr * x, rv[4] - vr * y, rv[5] - vr * z
+    vt = math.sqrt(tx * tx + ty * ty + tz * tz)
+    tx, ty, tz = tx / vt, ty / vt, tz / vt
+    hx, hy, hz = y * tz - z * ty, z * tx - x * tz, x * ty - y * tx
+    orbit = (r0, vr, vt, 2.0 * mu / r0 - vr * vr - vt * vt)
+    end = _plane_stm(tof, orbit, mu, tof)
+    u = x * dv2[0] + y * dv2[1] + z * dv2[2]
+    v = tx * dv2[0] + ty * dv2[1] + tz * dv2[2]
+    w = hx * dv2[0] + hy * dv2[1] + hz * dv2[2]
+    rhs[0] = end[0] * u + end[1] * v
+    rhs[1] = end[2] * u + end[3] * v
+    rhs[2] = end[4] * u + end[5] * v + x * dv1[0] + y * dv1[1] + z * dv1[2]
+    rhs[3] = end[6] * u + end[7] * v + tx * dv1[0] + ty * dv1[1] + tz * dv1[2]
+    rhs[4] = end[8] * w
+    rhs[5] = end[9] * w + hx * dv1[0] + hy * dv1[1] + hz * dv1[2]
     # At both ends one acceleration is unbounded, so that their relative difference is known.
     x1, f1 = 1.0, -1.0
     x2, f2 = 0.0, 1.0
@@ -213,7 +277,7 @@ def mima2_acceleration(
     mean_before = np.nan
     for _ in range(_MAX_EVALUATIONS):
         x = x1 + t * (x2 - x1)
-        a1, a2 = _accelerations(x, rv, tof, mu, rhs, end, scratch)
+        a1, a2 = _accelerations(x, orbit, tof, mu, rhs, end)
         f_first, mean_first = f_before, mean_before
         f_before, mean_before = f, mean
         f = (a1 - a2) / (a1 + a2)
@@ -278,8 +342,6 @@ def maximum_mass_batch(
     dv2 = np.empty(3)
     rv = np.empty(6)
     rhs = np.empty(6)
-    end = np.empty((6, 3))
-    scratch = (np.empty((6, 7)), np.empty(6), np.empty((6, 6)))
     for i in range(n):
         lambert(rv_dep[i, :3], rv_arr[i, :3], tof[i], max_revs, mu, v1, v2)
         for b in range(branches):
@@ -291,7 +353,7 @@ def maximum_mass_batch(
                 rv[j] = rv_dep[i, j]
                 rv[3 + j] = v1[b, j]
             if refined:
-                a = mima2_acceleration(rv, dv1, dv2, tof[i], mu, rhs, end, scratch)
+                a = mima2_acceleration(rv, dv1, dv2, tof[i], mu, rhs)
             else:
                 a, _ = mima_acceleration(dv1, dv2, tof[i])
             out[i, b] = mass_from_acceleration(a, tof[i], thrust[i], exhaust_velocity[i])
