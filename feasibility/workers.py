@@ -128,8 +128,11 @@ def own_threads() -> int:
     One for each processor that the process may run on, but one alone in a worker process,
     whose siblings use the others.
     """
-    if multiprocessing.parent_process() is not None:
-        return 1
+    return usable_processors() if multiprocessing.parent_process() is None else 1
+
+
+def usable_processors() -> int:
+    """Return how many processors this process may run on."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1

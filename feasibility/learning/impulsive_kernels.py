@@ -5,14 +5,14 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.jit import kernel
+from feasibility.jit import inner_kernel, kernel
 from feasibility.orbits.kepler_kernels import propagate
 from feasibility.orbits.lambert_kernels import lambert
 
 _Array = NDArray[np.float64]
 
 
-@kernel
+@inner_kernel
 def _cheapest(
     rv_dep: _Array,
     rv_arr: _Array,

@@ -12,7 +12,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.jit import kernel
+from feasibility.jit import inner_kernel, kernel
 from feasibility.learning.margin.path_kernels import (
     N_NODES,
     SATURATED,
@@ -49,6 +49,7 @@ _TWO_PI = 2.0 * math.pi
 _N_COUNTS = 5
 _WORTH_REFINING = 3.0
 _N_ROUNDS = 3
+# int() at the calls: numba would compile a kernel once for each literal number of steps.
 _FIRST_STEPS = 3
 _NEXT_STEPS = 2
 _DAMPING = 0.65
@@ -61,13 +62,13 @@ _LEAST_LOG = -1.5
 _LARGEST_LOG = 3.0
 
 
-@kernel
+@inner_kernel
 def clip(x: float, low: float, high: float) -> float:
     """Return x within the bounds."""
     return min(max(x, low), high)
 
 
-@kernel
+@inner_kernel
 def to_frame(rv_dep: _Array, rv_arr: _Array, mu: float, s0: _Array, s1: _Array) -> float:
     """Write both states as seen from the departure orbit; return its semi-major axis in m.
 
@@ -100,7 +101,7 @@ def to_frame(rv_dep: _Array, rv_arr: _Array, mu: float, s0: _Array, s1: _Array) 
     return a
 
 
-@kernel
+@inner_kernel
 def lambert_hints(
     s0: _Array,
     s1: _Array,
@@ -138,7 +139,7 @@ def lambert_hints(
             branch[revs] = b
 
 
-@kernel
+@inner_kernel
 def lambert_path(
     s0: _Array,
     s1: _Array,
@@ -172,17 +173,17 @@ def lambert_path(
         anomaly[end] = (1 - end) * tof
     if not impulse_effects(path, 2, rows, anomaly):
         return SATURATED
-    add_impulse(s0, v1[b], dv1, rows, 0, d)
-    add_impulse(s1, v2[b], dv2, rows, 1, d)
+    add_impulse(s0, v1[b], dv1, rows, int(0), d)
+    add_impulse(s1, v2[b], dv2, rows, int(1), d)
     for i in range(N_NODES):
         path[5 * N_NODES + i] = x[5] + x[0] * tof * (i + 0.5) / N_NODES
     if not gauss_rows(path, tof, N_NODES, rows, anomaly):
         return SATURATED
-    z = smallest_impulse(rows, d, ve, 0.0, N_NODES, _FIRST_STEPS, p, weights, g, c, m)
+    z = smallest_impulse(rows, d, ve, 0.0, N_NODES, int(_FIRST_STEPS), p, weights, g, c, m)
     return z if 0.0 < z < SATURATED else SATURATED
 
 
-@kernel
+@inner_kernel
 def add_impulse(r: _Array, v: _Array, dv: _Array, rows: _Array, i: int, d: _Array) -> None:
     """Add to d the effect of an impulse at node i, where the state is r[:3] and v."""
     x, y, z = r[0], r[1], r[2]
@@ -203,7 +204,7 @@ def add_impulse(r: _Array, v: _Array, dv: _Array, rows: _Array, i: int, d: _Arra
     d[5] += rows[10 * N_NODES + i] * u + rows[11 * N_NODES + i] * t + rows[12 * N_NODES + i] * o
 
 
-@kernel
+@inner_kernel
 def coasted_state(n: float, ex: float, ey: float, longitude: float, state: _Array) -> None:
     """Write x, y, 0 and the velocity of a plane orbit: elements as in `path_kernels`."""
     f = longitude
@@ -228,7 +229,7 @@ def coasted_state(n: float, ex: float, ey: float, longitude: float, state: _Arra
     state[5] = 0.0
 
 
-@kernel
+@inner_kernel
 def geometry(
     s1: _Array,
     x0: _Array,
@@ -265,7 +266,7 @@ def geometry(
         out[o + 2] = az
 
 
-@kernel
+@inner_kernel
 def need(total: float, tof: float, ve: float, d: _Array, p: _Array, out: _Array) -> None:
     """Write the N_NEED features after the geometry: what has to be done, in terms of a hint.
 
@@ -285,7 +286,7 @@ def need(total: float, tof: float, ve: float, d: _Array, p: _Array, out: _Array)
         out[N_GEOMETRY + 8 + j] = clip(p[j] * d[j] / value, -3.0, 3.0)
 
 
-@kernel
+@inner_kernel
 def log_ratio(value: float, base: float) -> float:
     """Return log(value) - base within what a network is shown."""
     return clip(math.log(value) - base, _LEAST_LOG, _LARGEST_LOG)
@@ -327,7 +328,7 @@ def quick_features(
     first_path(x0, x1, tof, near, _LEAST_MOTION, QUICK_NODES, path)
     if not gauss_rows(path, tof, QUICK_NODES, rows, anomaly):
         return np.nan
-    z = smallest_impulse(rows, d, ve, 0.0, QUICK_NODES, 1, p, weights, g, c, m)
+    z = smallest_impulse(rows, d, ve, 0.0, QUICK_NODES, int(1), p, weights, g, c, m)
     if not 0.0 < z < SATURATED:
         return np.nan
     total = z * QUICK_NODES
@@ -340,25 +341,25 @@ def quick_features(
     return math.log(total / tof)
 
 
-@kernel
+@inner_kernel
 def wrapped(angle: float) -> float:
     """Return the angle moved by whole turns into [-pi, pi]."""
     return float(angle - _TWO_PI * np.rint(angle / _TWO_PI))
 
 
-@kernel
+@inner_kernel
 def turns_beside(q: int) -> int:
     """Return the q-th number of revolutions to try, counted from the nearest one."""
     return (0, 1, -1, 2, -2)[q]
 
 
-@kernel
+@inner_kernel
 def least_motion(q: int) -> float:
     """Return the least mean motion of a first path, for the q-th number of revolutions."""
     return _LEAST_MOTION if q == 0 else 0.0
 
 
-@kernel
+@inner_kernel
 def refine(
     x0: _Array,
     x1: _Array,
@@ -378,7 +379,7 @@ def refine(
     first_path(x0, x1, tof, excess, least, N_NODES, path)
     if not gauss_rows(path, tof, N_NODES, rows, anomaly):
         return False
-    value = smallest_impulse(rows, d, ve, 0.0, N_NODES, _FIRST_STEPS, p, weights, g, c, m)
+    value = smallest_impulse(rows, d, ve, 0.0, N_NODES, int(_FIRST_STEPS), p, weights, g, c, m)
     if not 0.0 < value < SATURATED:
         return False
     for j in range(_N_ROUNDS + 1):
@@ -392,7 +393,9 @@ def refine(
                 )
         if not gauss_rows(path, tof, N_NODES, rows, anomaly):
             return True
-        value = smallest_impulse(rows, d, ve, value, N_NODES, _NEXT_STEPS, p, weights, g, c, m)
+        value = smallest_impulse(
+            rows, d, ve, value, N_NODES, int(_NEXT_STEPS), p, weights, g, c, m
+        )
         if not 0.0 < value < SATURATED:
             return True
         for j in range(k, _N_ROUNDS + 1):
@@ -400,7 +403,7 @@ def refine(
     return True
 
 
-@kernel
+@inner_kernel
 def leg_features(
     rv_dep: _Array,
     rv_arr: _Array,
@@ -454,7 +457,7 @@ def leg_features(
         first_path(x0, x1, tof, excess, least_motion(q), N_NODES, path)
         if not gauss_rows(path, tof, N_NODES, rows, anomaly):
             continue
-        value = smallest_impulse(rows, d, ve, 0.0, N_NODES, 1, p, weights, g, c, m)
+        value = smallest_impulse(rows, d, ve, 0.0, N_NODES, int(1), p, weights, g, c, m)
         if not 0.0 < value < SATURATED:
             continue
         z_first[q] = value
@@ -538,7 +541,7 @@ def leg_features(
     return float(math.log(total / tof) + blend)
 
 
-@kernel
+@inner_kernel
 def feature_workspace() -> FeatureWork:
     """Return the scratch arrays of `leg_features` and `quick_features`."""
     branches = 1 + 2 * MAX_REVS

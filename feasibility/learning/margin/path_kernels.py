@@ -30,7 +30,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.jit import kernel, summing_kernel
+from feasibility.jit import inner_kernel, kernel, summing_kernel
 
 _Array = NDArray[np.float64]
 PathWork = tuple[_Array, _Array, _Array, _Array, _Array, _Array, _Array, _Array, _Array]
@@ -167,7 +167,7 @@ def impulse_effects(path: _Array, nodes: int, rows: _Array, anomaly: _Array) -> 
     return True
 
 
-@kernel
+@inner_kernel
 def first_path(
     x0: _Array, x1: _Array, tof: float, excess: float, least: float, nodes: int, path: _Array
 ) -> None:
@@ -190,7 +190,7 @@ def first_path(
         )
 
 
-@kernel
+@inner_kernel
 def gauss_rows(path: _Array, tof: float, nodes: int, rows: _Array, anomaly: _Array) -> bool:
     """Write the rows of all nodes of a path; return False if it leaves the ellipses."""
     for i in range(nodes):
@@ -198,7 +198,7 @@ def gauss_rows(path: _Array, tof: float, nodes: int, rows: _Array, anomaly: _Arr
     return impulse_effects(path, nodes, rows, anomaly)
 
 
-@kernel
+@inner_kernel
 def duals(rows: _Array, p: _Array, nodes: int, g: _Array) -> None:
     """Write C_i^T p and its length, (4,) a node."""
     for i in range(nodes):
@@ -359,7 +359,7 @@ def balanced_impulse(
     return z
 
 
-@kernel
+@inner_kernel
 def smallest_impulse(
     rows: _Array,
     d: _Array,
@@ -400,7 +400,7 @@ def smallest_impulse(
     return z
 
 
-@kernel
+@inner_kernel
 def reweight(g: _Array, c: _Array, nodes: int, weights: _Array) -> None:
     """Write weights c_i / |g_i|, bounded where a dual nearly vanishes."""
     mean = 0.0
@@ -411,7 +411,7 @@ def reweight(g: _Array, c: _Array, nodes: int, weights: _Array) -> None:
         weights[i] = c[i] / max(g[3 * N_NODES + i], least)
 
 
-@kernel
+@inner_kernel
 def flown_path(
     x0: _Array, rows: _Array, weights: _Array, g: _Array, tof: float, nodes: int, path: _Array
 ) -> None:
@@ -448,7 +448,7 @@ def flown_path(
         longitude += 2.0 * dl + n * dt
 
 
-@kernel
+@inner_kernel
 def workspace() -> PathWork:
     """Return scratch arrays: path, rows, p, weights, g, c, m, d, anomaly."""
     return (
