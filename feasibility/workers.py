@@ -11,6 +11,8 @@ from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExec
 from contextlib import contextmanager
 from typing import Any, Final, final
 
+from threadpoolctl import threadpool_limits
+
 _TRIES: Final = 3
 """How often a call is begun before its workers' deaths are taken for its own doing."""
 
@@ -165,6 +167,10 @@ def _process_pool(workers: int) -> ProcessPoolExecutor:
 
 def _prepare_worker() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    # Workers use all processors already; threads of linear algebra would wait for each other:
+    # with two workers on two processors small networks took six times as long.
+    os.environ["OMP_NUM_THREADS"] = "1"
+    threadpool_limits(1)
     # A worker waits for work for ever, even where its parent was killed.
     threading.Thread(target=_end_with_parent, daemon=True).start()
 

@@ -4,7 +4,7 @@ import time
 from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
-from typing import final
+from typing import Final, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,22 +17,33 @@ from seqsearch.best_nodes import best_nodes
 from seqsearch.counters import RankCounters
 from seqsearch.deadline import Deadline
 from seqsearch.expanders import Expander, ForecastExpander, GridExpander
-from seqsearch.expansion import Candidates, reached
+from seqsearch.flown_hops import FlownHops, flown_legs
 from seqsearch.frontier import Frontier, make_frontier, no_nodes
 from seqsearch.nodes import Nodes
-from seqsearch.optimisation import LegOptimiser, Optimised, SolvedHops
+from seqsearch.optimisation import LegOptimiser
 from seqsearch.own_moves import OwnMoves
 from seqsearch.own_moves_expander import OwnMovesExpander
 from seqsearch.pacing import Pacer, rebalanced
 from seqsearch.pruner_spec import parse_pruner, predictor_of
 from seqsearch.ranking import Ranking, TimePropellantRanking
 from seqsearch.rankings import make_ranking
+from seqsearch.scouting.camp import Camp
+from seqsearch.scouting.guide import Guide, starts_of
 from seqsearch.settings import SearchSettings
 from seqsearch.starts import dense_starts, reachable_starts
 from seqsearch.state import SearchState
 from seqsearch.tour import Tour
 from seqsearch.tour_problem import TourProblem
-from seqsearch.tree import FlownLeg, SearchTree
+from seqsearch.tree import SearchTree
+
+_SCOUTS: Final = 4
+"""Scouts sent out at a time; under a time limit two for each worker, if that is more."""
+
+_ITINERARIES: Final = 150
+"""Itineraries that a pass optimises."""
+
+_VARIANTS: Final = 3
+"""Nodes of a guided pass for each itinerary: the same bodies at different epochs and masses."""
 
 
 @final
@@ -158,7 +169,7 @@ def search(
         predictor,
         audit_predictor or predictor,
         ranking,
-        LegOptimiser(executor),
+        executor,
         Deadline(None if time_limit_s is None else time_limit_s - state.spent_s),
         max_solves,
         state,
@@ -180,7 +191,7 @@ class _Search:
         predictor: LegPredictor | None,
         audit_predictor: LegPredictor | None,
         ranking: Ranking | None,
-        optimiser: LegOptimiser,
+        executor: Executor | None,
         deadline: Deadline,
         max_solves: int | None,
         state: SearchState,
@@ -193,7 +204,7 @@ class _Search:
         self._pruner = pruner if isinstance(pruner, AllOf) else AllOf(pruner)
         self._predictor = predictor
         self._audit_predictor = audit_predictor
-        self._optimiser = optimiser
+        self._optimiser = LegOptimiser(executor)
         self._deadline = deadline
         self._max_solves = max_solves
         self._state = state
@@ -207,6 +218,7 @@ class _Search:
         self._pacer = None if deadline.remaining_s() is None else Pacer(problem, deadline)
         # Passes may rank differently; which of two tours is better must not depend on it.
         self._judge = TimePropellantRanking(settings.time_weight, settings.propellant_weight)
+        self._camp = self._make_camp(executor)
         self._spent_before = state.spent_s
         self._began = time.monotonic()
 
@@ -217,12 +229,20 @@ class _Search:
             if state.waiting is not None:
                 self._begin_pass()
                 self._run_pass(state.waiting)
+                state.guide = None
             while (
                 endless or state.pass_number < self._settings.passes
             ) and not self._out_of_budget():
                 state.pass_number += 1
                 self._begin_pass()
-                self._run_pass(self._start_nodes())
+                scouted = self._camp is not None and self._scout(self._camp)
+                if self._out_of_budget():
+                    break
+                nodes = self._start_nodes()
+                if scouted:
+                    self._report(nodes)
+                self._run_pass(nodes)
+                state.guide = None
         except KeyboardInterrupt:
             stopped = "interrupted"
         if stopped == "complete" and self._deadline.passed():
@@ -236,7 +256,7 @@ class _Search:
         if self._pacer is None:
             return
         state = self._state
-        self._pacer.begin_pass(state.pass_number)
+        self._pacer.begin_pass(state.pass_number, scouted=self._camp is not None)
         width = self._pacer.width(no_nodes(), state.settings, state.counters)
         starts = max(width, min(2 * width, self._settings.starts))
         screen_legs = max(self._pacer.screen_legs(), self._settings.screen_legs)
@@ -246,6 +266,44 @@ class _Search:
             screen_legs=screen_legs,
             start_epochs=self._pacer.start_epochs(self._settings),
         )
+
+    def _make_camp(self, executor: Executor | None) -> Camp | None:
+        """Return what sends out scouts; None where a search does without."""
+        settings = self._settings
+        wanted = settings.scout_generations if self._pacer is None else settings.scout_share
+        plain = (settings.ranking, settings.frontier) == ("weighted", "depth")
+        if not (wanted and plain) or self._given_ranking is not None:
+            return None
+        if self._predictor is None or isinstance(self._problem, OwnMoves):
+            return None
+        return Camp(self._problem, self._predictor, settings, executor)
+
+    def _scout(self, camp: Camp) -> bool:
+        """Look for itineraries, to which the pass will keep; False where there were none."""
+        state, pacer = self._state, self._pacer
+        counters = RankCounters(pass_number=state.pass_number, rank=0)
+        began = time.monotonic()
+        pool, settings = state.pool, state.settings
+        scouts = _SCOUTS if pacer is None else max(_SCOUTS, 2 * self._threads)
+        budget_s = 0.0 if pacer is None else settings.scout_share * pacer.seconds_of_pass()
+        generations, slowest_s = 0, 0.0
+        while not self._out_of_budget():
+            spent_s = time.monotonic() - began
+            if pacer is not None and generations and spent_s + slowest_s > budget_s:
+                break
+            if pacer is None and generations == settings.scout_generations:
+                break
+            pool, settings = camp.generation(pool, settings, scouts, self._rng, counters)
+            generations += 1
+            slowest_s = max(slowest_s, time.monotonic() - began - spent_s)
+        state.pool, guide = pool.unflown(_ITINERARIES)
+        state.settings = settings
+        state.guide = guide if len(guide) else None
+        counters.kept = len(guide)
+        counters.count_pruned({"predictor": counters.proposed - counters.nodes})
+        counters.seconds = time.monotonic() - began
+        state.counters.append(counters)
+        return state.guide is not None
 
     def _make_ranking(self) -> Ranking:
         return self._given_ranking or make_ranking(
@@ -272,17 +330,18 @@ class _Search:
             )
         if self._predictor is None:
             return GridExpander(*means)
-        return ForecastExpander(*means, self._predictor, self._threads)
+        guide = None if self._state.guide is None else Guide(self._state.guide)
+        return ForecastExpander(*means, self._predictor, self._threads, guide)
 
     def _run_pass(self, nodes: Nodes) -> None:
         """Run a pass from its starts, or go on with one."""
         state = self._state
         ranking = self._make_ranking()
         expander = self._make_expander(ranking)
-        frontier = make_frontier(state.settings, self._problem, ranking)
+        frontier = make_frontier(self._selecting(), self._problem, ranking)
         frontier.push(nodes)
         while len(nodes := frontier.pop()) and not self._out_of_budget():
-            if self._pacer is not None:
+            if self._pacer is not None and state.guide is None:
                 width = self._pacer.width(nodes, state.settings, state.counters)
                 state.settings = state.settings.with_(beam_width=width)
                 frontier = _remade(frontier, state.settings, self._problem, ranking)
@@ -298,7 +357,7 @@ class _Search:
             )
             found = None
             if expanded is not None and expanded.optimised.solved is not None:
-                found = _Found.of(self._problem, nodes, expanded.candidates, expanded.optimised)
+                found = FlownHops.of(self._problem, nodes, expanded.candidates, expanded.optimised)
             if expanded is not None:
                 counters.optimised = expanded.optimised.n_hops
                 counters.feasible = len(expanded.optimised.candidate)
@@ -310,10 +369,20 @@ class _Search:
             counters.cut = self._out_of_budget()
             counters.seconds = time.perf_counter() - start
             state.counters.append(counters)
-            if not counters.cut and frontier.waiting() is None:
+            if not counters.cut and frontier.waiting() is None and state.guide is None:
                 state.settings = rebalanced(state.settings, nodes, self._problem)
-            self._report(frontier)
+            self._report(frontier.waiting())
         state.waiting = None
+
+    def _selecting(self) -> SearchSettings:
+        """Return the settings by which nodes are selected: a guided pass keeps all itineraries."""
+        settings, guide = self._state.settings, self._state.guide
+        if guide is None:
+            return settings
+        width = _VARIANTS * len(guide)
+        return settings.with_(
+            beam_width=width, max_per_parent=width, max_per_cell=width, max_start_share=1.0
+        )
 
     def _out_of_budget(self) -> bool:
         spent = self._max_solves is not None and self._state.solves >= self._max_solves
@@ -327,9 +396,9 @@ class _Search:
         left = self._max_solves - self._state.solves
         return settings.with_(solves_per_rank=min(left, settings.solves_per_rank))
 
-    def _report(self, frontier: Frontier) -> None:
+    def _report(self, waiting: Nodes | None) -> None:
         state = self._state
-        state.waiting = frontier.waiting()
+        state.waiting = waiting
         state.rng_state = dict(self._rng.bit_generator.state)
         state.spent_s = self._spent_before + time.monotonic() - self._began
         if self._on_rank is not None:
@@ -337,7 +406,9 @@ class _Search:
 
     def _start_nodes(self) -> Nodes:
         state = self._state
-        if isinstance(self._problem, OwnMoves):
+        if state.guide is not None:
+            nodes = self._problem.start_nodes(*starts_of(state.guide))
+        elif isinstance(self._problem, OwnMoves):
             nodes = self._problem.starts(state.settings, self._rng)
         else:
             nodes = self._problem.start_nodes(*self._choose_starts())
@@ -376,7 +447,7 @@ class _Search:
         sample: RankSample,
         frontier: Frontier,
         nodes: Nodes,
-        found: "_Found | None",
+        found: FlownHops | None,
         counters: RankCounters,
     ) -> None:
         def contends(lost: Nodes) -> NDArray[np.bool_]:
@@ -395,10 +466,10 @@ class _Search:
         )
         counters.seconds_audit = time.perf_counter() - clock
 
-    def _advance(self, frontier: Frontier, found: "_Found", counters: RankCounters) -> None:
+    def _advance(self, frontier: Frontier, found: FlownHops, counters: RankCounters) -> None:
         """Hang the nodes that go on into the tree and into the frontier."""
         chosen = frontier.admit(found.nodes)
-        chains = _flown_legs(self._problem, found.flown.take(chosen), found.solved.take(chosen))
+        chains = flown_legs(self._problem, found.flown.take(chosen), found.solved.take(chosen))
         ids = [
             self._state.tree.add_hop(int(parent), chain)
             for parent, chain in zip(found.nodes.parent_id[chosen], chains, strict=True)
@@ -434,55 +505,3 @@ def _remade(
     if waiting is not None:
         remade.push(waiting)
     return remade
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class _Found:
-    """Flyable hops and the nodes that they lead to, n each."""
-
-    flown: Candidates
-    solved: SolvedHops
-    nodes: Nodes
-
-    @classmethod
-    def of(
-        cls, problem: TourProblem, parents: Nodes, candidates: Candidates, optimised: Optimised
-    ) -> "_Found":
-        assert optimised.solved is not None
-        flown = candidates.take(optimised.candidate)
-        m_final = optimised.solved.solutions[-1].m_final
-        return cls(flown, optimised.solved, reached(problem, parents, flown, m_final))
-
-
-def _flown_legs(
-    problem: TourProblem, flown: Candidates, solved: SolvedHops
-) -> list[tuple[FlownLeg, ...]]:
-    """Return the legs of each hop."""
-    chains: list[tuple[FlownLeg, ...]] = [() for _ in range(len(flown))]
-    stages = zip(
-        flown.hops.stages, flown.hops.dropped_kg, solved.m_star, solved.solutions, strict=True
-    )
-    for legs, dropped, m_star, solution in stages:
-        assert legs.t_dep_mjd2000 is not None
-        assert legs.dep_id is not None
-        assert legs.arr_id is not None
-        dep_row = problem.catalogue.rows_of(legs.dep_id)
-        arr_row = problem.catalogue.rows_of(legs.arr_id)
-        for i in range(len(legs)):
-            leg = FlownLeg(
-                dep_row=int(dep_row[i]),
-                arr_row=int(arr_row[i]),
-                rv_dep=legs.rv_dep[i],
-                rv_arr=legs.rv_arr[i],
-                t_dep_mjd2000=float(legs.t_dep_mjd2000[i]),
-                tof_days=float(legs.tof_days[i]),
-                m0=float(solution.m0[i]),
-                m_final=float(solution.m_final[i]),
-                m_star=float(m_star[i]),
-                dropped=float(dropped[i]),
-                throttles=solution.throttles[i],
-                mismatch=float(solution.mismatch[i]),
-            )
-            chains[i] += (leg,)
-    return chains

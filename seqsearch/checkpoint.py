@@ -25,6 +25,7 @@ from feasibility.atomic import atomic_path
 from feasibility.orbits import Catalogue
 from seqsearch.counters import RankCounters
 from seqsearch.nodes import Nodes
+from seqsearch.scouting.pool import Pool
 from seqsearch.settings import SearchSettings
 from seqsearch.state import SearchState
 from seqsearch.tree import FlownLeg, SearchTree
@@ -33,7 +34,7 @@ FOLDER: Final = "checkpoints"
 """Name of the folder inside a run folder."""
 
 _FORMAT: Final = "seqsearch checkpoint"
-_VERSION: Final = 1
+_VERSION: Final = 2
 _ORIGIN: Final = "origin.ckpt"
 _T = TypeVar("_T")
 
@@ -71,7 +72,10 @@ class _Node(msgspec.Struct, frozen=True, array_like=True):
 
 
 class _Rank(msgspec.Struct, frozen=True, kw_only=True):
-    """What one rank added to a `SearchState`, and what replaces its other members."""
+    """What one rank added to a `SearchState`, and what replaces its other members.
+
+    `pool` is None where it is the one of the rank before.
+    """
 
     previous: str
     nodes: list[_Node]
@@ -79,6 +83,8 @@ class _Rank(msgspec.Struct, frozen=True, kw_only=True):
     settings: SearchSettings
     pass_number: int
     waiting: Nodes | None
+    pool: Pool | None
+    guide: Nodes | None
     rng_state: str
     best_node: int
     best_key: tuple[int, float]
@@ -106,6 +112,7 @@ class Checkpoints:
         self._files = 0
         self._nodes = 0
         self._counters = 0
+        self._pool: Pool | None = None
         self._digest = ""
 
     @classmethod
@@ -143,6 +150,8 @@ class Checkpoints:
             settings=state.settings,
             pass_number=state.pass_number,
             waiting=state.waiting,
+            pool=None if state.pool is self._pool else state.pool,
+            guide=state.guide,
             rng_state=json.dumps(state.rng_state, default=_plain),
             best_node=state.best_node,
             best_key=state.best_key,
@@ -152,6 +161,7 @@ class Checkpoints:
         name = f"{self._files:06}-pass-{state.pass_number}-rank-{_rank_number(state)}.ckpt"
         self._digest = _write(self.path / name, rank)
         self._files += 1
+        self._pool = state.pool
         self._nodes, self._counters = len(graph), len(state.counters)
 
     @classmethod
@@ -208,6 +218,7 @@ class Checkpoints:
             raise InputError(f"{path}: no checkpoint to go on from")
         checkpoints._nodes, checkpoints._counters = len(state.tree), len(state.counters)
         checkpoints._digest = digest
+        checkpoints._pool = state.pool
         return checkpoints, state
 
     def discard_later(self) -> None:
@@ -237,6 +248,8 @@ def _apply(rank: _Rank, state: SearchState, file: Path) -> None:
     state.settings = rank.settings
     state.pass_number = rank.pass_number
     state.waiting = rank.waiting
+    state.pool = rank.pool or state.pool
+    state.guide = rank.guide
     state.rng_state = json.loads(rank.rng_state)
     state.best_node = rank.best_node
     state.best_key = rank.best_key

@@ -14,7 +14,8 @@ class RankCounters:
     Attributes
     ----------
     pass_number, rank : int
-        Pass from 1; rank from 1, the number of legs of the nodes produced.
+        Pass from 1; rank from 1, the number of legs of the nodes produced; 0 for the
+        scouting before a pass, of which no leg is optimised.
     nodes : int
         Nodes that were expanded.
     proposed : int
@@ -32,7 +33,7 @@ class RankCounters:
     feasible : int
         Legs it could fly.
     kept : int
-        Nodes kept for the next rank.
+        Nodes kept for the next rank; itineraries that scouts found worth optimising.
     cut : bool
         A budget ran out at this rank; it is not complete.
     audit : RankAudit or None

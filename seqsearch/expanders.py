@@ -20,6 +20,7 @@ from seqsearch.margin_curves import flight_times
 from seqsearch.nodes import Nodes
 from seqsearch.optimisation import LegOptimiser, Optimised
 from seqsearch.ranking import Ranking
+from seqsearch.scouting.guide import Guide
 from seqsearch.settings import SearchSettings
 from seqsearch.tour_problem import Hops, TourProblem
 
@@ -175,6 +176,8 @@ class ForecastExpander:
         Whom to ask.
     threads : int
         Threads that ask.
+    guide : Guide, optional
+        Keeps the search to its itineraries; the audit sees the other hops too.
     """
 
     def __init__(
@@ -186,11 +189,13 @@ class ForecastExpander:
         optimiser: LegOptimiser,
         predictor: LegPredictor,
         threads: int,
+        guide: Guide | None = None,
     ) -> None:
         self._problem = problem
         self._pruner = pruner
         self._ranking = ranking
         self._optimiser = optimiser
+        self._guide = guide
         self._forecast = Forecast(problem, predictor, neighbours, threads)
 
     def expand(
@@ -241,9 +246,12 @@ class ForecastExpander:
             counters.proposed += survey.proposed
             if sample is not None:
                 self._show(sample, nodes, survey, settings)
-            if len(survey.prospects):
-                prospects.append(survey.prospects)
-            if len(survey.unknown):
+            known = survey.prospects
+            if self._guide is not None:
+                known = known.take(self._guide.allows(nodes, known.parent, known.target))
+            if len(known):
+                prospects.append(known)
+            if len(survey.unknown) and self._guide is None:
                 unknown.append(survey.longest.take(survey.unknown))
             if deadline.passed():
                 break

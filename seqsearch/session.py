@@ -152,8 +152,12 @@ def _go_on(path: Path) -> str:
 
 def _compile_side_by_side(executor: Executor | None, pruner: Pruner) -> None:
     """Compile the solver's kernels in one worker while this process compiles the pruner's."""
+    # Imported here: it loads numba.
+    from feasibility.jit import rare_collections
+
     solver = None if executor is None else executor.submit(compile_kernels)
-    pruner.keep(sample_leg())
+    with rare_collections():
+        pruner.keep(sample_leg())
     if solver is None:
         compile_kernels()
     else:
@@ -161,6 +165,12 @@ def _compile_side_by_side(executor: Executor | None, pruner: Pruner) -> None:
 
 
 def _rank_line(counters: RankCounters, tour: Tour) -> str:
+    if counters.rank == 0:
+        return (
+            f"pass {counters.pass_number} scouts : {counters.nodes} nodes, "
+            f"{counters.proposed} proposed, {counters.kept} itineraries to optimise, "
+            f"{counters.seconds:.1f} s | best {tour.headline()}"
+        )
     pruned = ", ".join(f"{name} {count}" for name, count in counters.pruned.items())
     return (
         f"pass {counters.pass_number} rank {counters.rank:>2}: {counters.nodes} nodes, "

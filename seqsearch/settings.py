@@ -82,6 +82,14 @@ class SearchSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
         Visits of a good tour, by which the frontier ``"time"`` values one more.
     passes : int
         Beams run one after another, each with starts of its own.
+    scout_generations : int
+        Where there is no time limit, how often four scouts are sent out before each pass,
+        which then keeps to the best itineraries that they found; 0 for no scouts. They need a
+        predictor, ``ranking = "weighted"`` and ``frontier = "depth"``.
+    scout_share : float
+        Under a time limit, the share of each pass that is spent on scouting.
+    scout_width : int
+        Beam width of a scout.
     """
 
     beam_width: _Count = 200
@@ -115,6 +123,9 @@ class SearchSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
     slice_days: _Positive = 40.0
     nominal_visits: _Count = 14
     passes: _Count = 1
+    scout_generations: Annotated[int, Meta(ge=0)] = 0
+    scout_share: Annotated[float, Meta(ge=0, lt=1)] = 0.75
+    scout_width: _Count = 300
 
     def __post_init__(self) -> None:
         if self.tof_days_max < self.tof_days_min:

@@ -33,6 +33,7 @@ def dense_starts(
     neighbours: OrbitalNeighbours,
     settings: SearchSettings,
     rng: np.random.Generator,
+    window: tuple[float, float] | None = None,
 ) -> tuple[_Rows, _Array]:
     """Choose the asteroid-epoch pairs from which tours start, by the orbital metric.
 
@@ -40,7 +41,7 @@ def dense_starts(
     the departure window (stratified, so that passes with other seeds see other
     epochs). At each, every allowed body's distance to its eighth nearest
     neighbour in the orbital metric is found; the pairs with the smallest win,
-    each body at most once.
+    each body at most once. `window` replaces the problem's earliest and latest start epoch.
 
     Returns
     -------
@@ -50,7 +51,7 @@ def dense_starts(
         Start epochs.
     """
     rows, epochs, distances = _crowded(
-        problem, neighbours, settings, rng, per_epoch=4 * settings.starts
+        problem, neighbours, settings, rng, 4 * settings.starts, window
     )
     chosen = _best_of_each_body(rows, distances, settings.starts)
     return rows[chosen], epochs[chosen]
@@ -131,9 +132,10 @@ def _crowded(
     settings: SearchSettings,
     rng: np.random.Generator,
     per_epoch: int,
+    window: tuple[float, float] | None = None,
 ) -> tuple[_Rows, _Array, _Array]:
     """Return rows, epochs and distances to the eighth neighbour of the densest at each epoch."""
-    earliest, latest = problem.first_departure_mjd2000
+    earliest, latest = window or problem.first_departure_mjd2000
     slices = (np.arange(settings.start_epochs) + rng.random(settings.start_epochs)) / (
         settings.start_epochs
     )

@@ -5,6 +5,7 @@ from typing import Any, final
 
 from seqsearch.counters import RankCounters
 from seqsearch.nodes import Nodes
+from seqsearch.scouting.pool import Pool
 from seqsearch.settings import SearchSettings
 from seqsearch.tree import SearchTree
 
@@ -24,6 +25,10 @@ class SearchState:
         Settings of this pass, which may differ from those of the search.
     waiting : Nodes or None
         Nodes that are still to be expanded in this pass; None between passes.
+    pool : Pool
+        Itineraries that scouts have found, over all passes. It is replaced, never changed.
+    guide : Nodes or None
+        Ends of the itineraries to which this pass keeps; None for none.
     tree : SearchTree
         All nodes that were kept, over all passes.
     counters : list of RankCounters
@@ -43,6 +48,8 @@ class SearchState:
     settings: SearchSettings
     pass_number: int = 0
     waiting: Nodes | None = None
+    pool: Pool = field(default_factory=Pool.empty)
+    guide: Nodes | None = None
     tree: SearchTree = field(default_factory=SearchTree)
     counters: list[RankCounters] = field(default_factory=list)
     rng_state: dict[str, Any] = field(default_factory=dict)

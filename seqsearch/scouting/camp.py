@@ -1,0 +1,232 @@
+"""`Camp`: sends out scouts, side by side, and keeps the pool of what they found.
+
+Part of the scouts explores: each a slice of the departure window, as niches found in one beam
+for the whole window crowd each other out. The others are sent near itineraries of the pool,
+starting some days or some bodies away from them.
+"""
+
+import functools
+import pickle
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from typing import Final, final
+
+import numpy as np
+
+from feasibility.orbits import OrbitalNeighbours
+from feasibility.pruners.predictor import LegPredictor
+from seqsearch.counters import RankCounters
+from seqsearch.forecast import Forecast
+from seqsearch.nodes import Nodes
+from seqsearch.pacing import rebalanced
+from seqsearch.ranking import TimePropellantRanking
+from seqsearch.scouting.pool import Pool
+from seqsearch.scouting.regions import starts_near, window_part
+from seqsearch.scouting.scout import Scouted, scout
+from seqsearch.settings import SearchSettings
+from seqsearch.starts import dense_starts
+from seqsearch.tour_problem import TourProblem
+
+_SLICE_DAYS: Final = 300.0
+"""About the length of the part of the departure window that one scout explores."""
+
+_SLICE_EPOCHS: Final = 6
+"""A slice is looked at at so many epochs."""
+
+_EXPLORING: Final = 0.4
+"""Share of the scouts that explore."""
+
+_NICHES: Final = 8
+"""As long as the pool has fewer niches than this, all scouts explore."""
+
+_WEIGHT_SPREAD: Final = 0.25
+"""Scouts weigh propellant differently: standard deviation of the logarithm of the weight."""
+
+_START_SHARE: Final = 0.3
+"""Most nodes of a rank that started at one body, near a known itinerary."""
+
+_STARTS: Final = 2
+"""Starts of a scout, in units of the beam width. They are not screened by the predictor, as the
+beam's first rank does that: with 300 screened starts scouts ended later than with 600 others."""
+
+_BALANCE_NODES: Final = 20
+_BALANCE_GAIN: Final = 2.0
+"""The best so many itineraries tell what runs out first; the weight follows slowly."""
+
+
+@final
+@dataclass(frozen=True)
+class _Order:
+    """What one scout is told: its seed, and a part of the window or an itinerary."""
+
+    seed: int
+    settings: SearchSettings
+    window: tuple[float, float] | None
+    near: Nodes | None
+
+
+@final
+class Camp:
+    """Sends out scouts.
+
+    Parameters
+    ----------
+    problem : TourProblem
+        What to solve.
+    predictor : LegPredictor
+        Whom they ask.
+    settings : SearchSettings
+        Settings of the search.
+    executor : concurrent.futures.Executor, optional
+        Where they work; default, and where the predictor cannot be sent to another
+        process: here.
+    """
+
+    def __init__(
+        self,
+        problem: TourProblem,
+        predictor: LegPredictor,
+        settings: SearchSettings,
+        executor: Executor | None = None,
+    ) -> None:
+        self._problem = problem
+        self._means = _Means(problem, predictor, settings.reference_tof_days)
+        self._executor = executor
+        self._packed = b""
+        if executor is not None:
+            try:
+                self._packed = pickle.dumps(self._means)
+            except (pickle.PicklingError, AttributeError, TypeError):
+                self._executor = None
+
+    def generation(
+        self,
+        pool: Pool,
+        settings: SearchSettings,
+        scouts: int,
+        rng: np.random.Generator,
+        counters: RankCounters,
+    ) -> tuple[Pool, SearchSettings]:
+        """Send out scouts at the same time and wait for all of them.
+
+        Parameters
+        ----------
+        pool : Pool
+            What is known.
+        settings : SearchSettings
+            `scout_width`, caps and weights.
+        scouts : int
+            How many.
+        rng : numpy.random.Generator
+            Draws where they go. The result does not depend on the executor.
+        counters : RankCounters
+            What they did is added.
+
+        Returns
+        -------
+        pool : Pool
+            With what they found.
+        settings : SearchSettings
+            With a weight of propellant that follows what the best itineraries have left.
+        """
+        ranking = TimePropellantRanking(settings.time_weight, settings.propellant_weight)
+        pool, orders = self._orders(pool, settings, scouts, rng, ranking)
+        found = []
+        for order, scouted in zip(orders, self._send(orders), strict=True):
+            picks = 0 if order.near is None else self._picks_of(pool, order.near) // 2
+            found.append((scouted.leaves, picks))
+            counters.nodes += scouted.nodes
+            counters.proposed += scouted.proposed
+            counters.questions += scouted.questions
+        pool = pool.merged(found, ranking, self._problem)
+        if len(pool):
+            best = pool.nodes.take(np.arange(min(len(pool), _BALANCE_NODES)))
+            settings = rebalanced(settings, best, self._problem, gain=_BALANCE_GAIN)
+        return pool, settings
+
+    def _orders(
+        self,
+        pool: Pool,
+        settings: SearchSettings,
+        scouts: int,
+        rng: np.random.Generator,
+        ranking: TimePropellantRanking,
+    ) -> tuple[Pool, list[_Order]]:
+        explorers = scouts
+        if len(pool) and pool.niches().max() + 1 >= _NICHES:
+            explorers = int(np.count_nonzero(rng.random(scouts) < _EXPLORING))
+        first, last = self._problem.first_departure_mjd2000
+        slices = max(1, round((last - first) / _SLICE_DAYS))
+        # Evenly spread, as few scouts have the whole window to look at.
+        offset = rng.random()
+        parts = [int(slices * ((offset + k / explorers) % 1.0)) for k in range(explorers)]
+        pool, rows = pool.picks(scouts - explorers, ranking, self._problem)
+        orders = []
+        for k in range(scouts):
+            weight = settings.propellant_weight * np.exp(_WEIGHT_SPREAD * rng.normal())
+            changes: dict[str, object] = {
+                "beam_width": settings.scout_width,
+                "propellant_weight": float(weight),
+            }
+            seed = int(rng.integers(2**62))
+            if k < explorers:
+                changes |= {
+                    "starts": _STARTS * settings.scout_width,
+                    "start_epochs": _SLICE_EPOCHS,
+                }
+                window = window_part(self._problem, parts[k], slices)
+                orders.append(_Order(seed, settings.with_(**changes), window, None))
+            else:
+                changes |= {"max_start_share": _START_SHARE}
+                row = rows[[k - explorers]]
+                orders.append(_Order(seed, settings.with_(**changes), None, pool.nodes.take(row)))
+        return pool, orders
+
+    def _send(self, orders: list[_Order]) -> list[Scouted]:
+        if self._executor is None:
+            return [_scouted(self._means, order) for order in orders]
+        futures = [self._executor.submit(_scouted_there, self._packed, order) for order in orders]
+        return [future.result() for future in futures]
+
+    @staticmethod
+    def _picks_of(pool: Pool, itinerary: Nodes) -> int:
+        width = min(pool.nodes.visited.shape[1], itinerary.visited.shape[1])
+        same = (pool.nodes.visited[:, :width] == itinerary.visited[:, :width]).all(axis=1)
+        return int(pool.picked[same].max(initial=0))
+
+
+@final
+class _Means:
+    """What all scouts of one process share."""
+
+    def __init__(
+        self, problem: TourProblem, predictor: LegPredictor, reference_tof_days: float
+    ) -> None:
+        self.problem = problem
+        self.predictor = predictor
+        self.neighbours = OrbitalNeighbours(
+            problem.catalogue, reference_tof_days=reference_tof_days
+        )
+        self.forecast = Forecast(problem, predictor, self.neighbours)
+
+
+def _scouted(means: _Means, order: _Order) -> Scouted:
+    rng = np.random.default_rng(order.seed)
+    settings = order.settings
+    if order.near is not None:
+        count = _STARTS * settings.beam_width
+        starts = starts_near(means.problem, means.neighbours, order.near, count, rng)
+    else:
+        starts = dense_starts(means.problem, means.neighbours, settings, rng, order.window)
+    return scout(means.problem, means.forecast, means.problem.start_nodes(*starts), settings)
+
+
+@functools.lru_cache(maxsize=1)
+def _unpacked(means: bytes) -> _Means:
+    unpacked = pickle.loads(means)
+    assert isinstance(unpacked, _Means)
+    return unpacked
+
+
+def _scouted_there(means: bytes, order: _Order) -> Scouted:
+    return _scouted(_unpacked(means), order)
