@@ -453,7 +453,11 @@ class _Search:
         def contends(lost: Nodes) -> NDArray[np.bool_]:
             n = 0 if found is None else len(found.nodes)
             rivals = lost if found is None else Nodes.concatenate([found.nodes, lost])
-            return np.isin(np.arange(n, n + len(lost)), frontier.admit(rivals))
+            chosen = frontier.admit(rivals)
+            if self._state.guide is not None:
+                # A guided pass keeps all that it finds: what is lost must be better than some of it.
+                chosen = chosen[: max(1, n)]
+            return np.isin(np.arange(n, n + len(lost)), chosen)
 
         clock = time.perf_counter()
         counters.audit = sample.solve(

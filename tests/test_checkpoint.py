@@ -219,9 +219,9 @@ def test_what_is_no_checkpoint_is_refused(copied, content):
 
 def test_another_version_is_refused(copied):
     path = _third(copied)
-    content = path.read_bytes().replace(b"seqsearch checkpoint 1", b"seqsearch checkpoint 2")
+    content = path.read_bytes().replace(b"seqsearch checkpoint 2", b"seqsearch checkpoint 3")
     path.write_bytes(content)
-    _refused(copied, "another version", "checkpoint 2")
+    _refused(copied, "another version", "checkpoint 3")
 
 
 def test_a_missing_rank_is_noticed(copied):

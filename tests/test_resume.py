@@ -41,6 +41,18 @@ def whole(problem_file, tmp_path_factory):
     return out
 
 
+@pytest.fixture(scope="module")
+def scouted(tmp_path_factory):
+    """A run of two passes that begin with scouting."""
+    path = tmp_path_factory.mktemp("scouted")
+    text = QUICK.replace("mima2:0.97", "default:0.99") + "scout_generations = 1\nscout_width = 6\n"
+    (path / "scouted.toml").write_text(text)
+    out = path / "whole"
+    arguments = ["run", str(path / "scouted.toml"), "--seed", "3", "--workers", "1"]
+    assert main([*arguments, "--out", str(out)]) == 0
+    return out
+
+
 @pytest.fixture
 def copied(whole, tmp_path):
     shutil.copytree(whole, tmp_path / "run")
@@ -99,6 +111,14 @@ def test_from_an_earlier_rank_it_comes_to_the_same(copied, whole, capsys):
     assert _resume(copied, "--from-rank", "1:1") == 0
     assert "pass 1 rank  2" in capsys.readouterr().out
     _assert_same(copied, whole)
+
+
+@pytest.mark.parametrize("rank", ["1:0", "1:1", "2:0", "0:0"])
+def test_scouting_and_guided_passes_resume_to_the_same(scouted, tmp_path, rank):
+    shutil.copytree(scouted, tmp_path / "run")
+    assert [row["rank"] for row in _counters(scouted)].count("0") == 2
+    assert _resume(tmp_path / "run", "--from-rank", rank) == 0
+    _assert_same(tmp_path / "run", scouted)
 
 
 def test_from_the_beginning(copied, whole):
