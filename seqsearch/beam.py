@@ -455,7 +455,7 @@ class _Search:
             rivals = lost if found is None else Nodes.concatenate([found.nodes, lost])
             chosen = frontier.admit(rivals)
             if self._state.guide is not None:
-                # A guided pass keeps all that it finds: what is lost must be better than some of it.
+                # A guided pass keeps all it finds: what is lost must be better than some of it.
                 chosen = chosen[: max(1, n)]
             return np.isin(np.arange(n, n + len(lost)), chosen)
 

@@ -26,14 +26,13 @@ _STRETCHES: Final = (1.0, 1.03, 1.07, 1.12, 1.18, 1.25, 1.4)
 _SPARE: Final = 2.0
 """Pairs that get a good answer, for each node that goes on."""
 
-_WIDE_UNTIL: Final = 0.3
-_NARROW_FROM: Final = 0.7
-_WIDEST: Final = 2.0
-_NARROWEST: Final = 0.3
+_ELAPSED: Final = (0.3, 0.7, 0.8, 0.9)
+_WIDTHS: Final = (2.0, 0.3, 0.3, 2.0)
 """Width in units of `beam_width`, by the share of the longest duration that has elapsed.
 
-In the first ranks the score says little about a tour's end: on GTOC7 the best tours of a beam came
-from anywhere in its first five ranks, but from the best tenth of its last five."""
+In the first ranks the score says little about a tour's end: on GTOC7 the best tours of a beam
+came from anywhere in its first five ranks, but from the best tenth of its last five. At the end
+any node may have just enough left for another visit, and few hops can be flown anyway."""
 
 _LEAVES: Final = 100
 """Itineraries of each of the last two ranks that are returned."""
@@ -127,7 +126,7 @@ def _children(
 def _width(nodes: Nodes, problem: TourProblem, width: int) -> int:
     elapsed = float((nodes.t_arr_mjd2000 - nodes.t_first_mjd2000).mean())
     share = elapsed / problem.max_duration_days
-    factor = np.exp(np.interp(share, (_WIDE_UNTIL, _NARROW_FROM), np.log((_WIDEST, _NARROWEST))))
+    factor = np.exp(np.interp(share, _ELAPSED, np.log(_WIDTHS)))
     return max(1, round(width * float(factor)))
 
 
