@@ -3,11 +3,14 @@
 Run from the repository: python benchmarks/search.py --catalogue GTOC7-DATA.txt
 [--time-limit 2min | --beam-width 50] [--seed 0] [--workers 2] [--out FILE.json]
 
-Problem, seed and wall-clock budget are the same for all. With a classifier the search
-chooses flight times by its answers; with the other pruners it proposes a fixed grid of
-them. The false-prune rate is that of the audit, the same for all: legs are sorted by the
-default model, and optimised by the solver of the search. "for N" is how many legs had been
-optimised when the tour first had as many asteroids as without pruning at the end.
+Problem, seed and wall-clock budget are the same for all. With a classifier the search sends
+out scouts and chooses flight times by its answers; with the other pruners it proposes a fixed
+grid of flight times and optimises all that survive, for each pair from the shortest until two
+can be flown. Without a pruner that takes so many optimisations that the beam is kept to
+--unpruned-width nodes, or no pass would come to its end. The false-prune rate is that of the
+audit, the same for all: legs are sorted by the default model, and optimised by the solver of the
+search. "for N" is how many legs had been optimised when the tour first had as many asteroids as
+without pruning at the end.
 Times are by the wall clock: other work on the same cores makes all runs shorter of breath.
 With --beam-width instead of a time limit, nothing but the seconds depends on the machine.
 """
@@ -37,6 +40,7 @@ from seqsearch.tour_problem import TourProblem
 from seqsearch.verify import verify_tour
 
 UNPRUNED = "none"
+ALL = 10**9
 PRUNERS = (UNPRUNED, "lambert:1.3", "mima2:0.97", "default:0.99", "default:1")
 
 
@@ -67,6 +71,9 @@ def run(
     def on_rank(state: SearchState) -> None:
         steps.append((sum(r.optimised for r in state.counters), state.best_key[0] + 1))
 
+    settings = settings.with_(pruner=pruner, solves_per_rank=ALL)
+    if pruner == UNPRUNED and not options.beam_width:
+        settings = settings.with_(max_beam_width=options.unpruned_width)
     parsed = parse_pruner(pruner)
     parsed.keep(sample_leg())
     with worker_pool(options.workers) as pool:
@@ -78,7 +85,7 @@ def run(
             problem,
             pruner=parsed,
             audit_predictor=FeasibilityClassifier.load(),
-            settings=settings.with_(pruner=pruner),
+            settings=settings,
             rng=np.random.default_rng(options.seed),
             executor=pool,
             threads=options.workers,
@@ -122,6 +129,9 @@ def main() -> None:
     parser.add_argument("--problem", default="gtoc7")
     parser.add_argument("--time-limit", default="2min", help="of each run")
     parser.add_argument("--beam-width", type=int, help="one pass so wide, without a time limit")
+    parser.add_argument(
+        "--unpruned-width", type=int, default=15, help="widest beam without a pruner (default 15)"
+    )
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
     parser.add_argument("--pruners", nargs="+", default=PRUNERS, help="the first is the measure")
