@@ -293,11 +293,10 @@ class _Search:
                 break
             if pacer is None and generations == settings.scout_generations:
                 break
-            pool, settings = camp.generation(pool, settings, scouts, self._rng, counters)
+            pool = camp.generation(pool, settings, scouts, self._rng, counters)
             generations += 1
             slowest_s = max(slowest_s, time.monotonic() - began - spent_s)
         state.pool, guide = pool.unflown(_ITINERARIES)
-        state.settings = settings
         state.guide = guide if len(guide) else None
         counters.kept = len(guide)
         counters.count_pruned({"predictor": counters.proposed - counters.nodes})

@@ -134,9 +134,7 @@ _WEIGHT_RANGE: Final = (0.05, 3.0)
 """Least and largest weight of propellant, in units of that of time."""
 
 
-def rebalanced(
-    settings: SearchSettings, nodes: Nodes, problem: TourProblem, gain: float = _GAIN
-) -> SearchSettings:
+def rebalanced(settings: SearchSettings, nodes: Nodes, problem: TourProblem) -> SearchSettings:
     """Return settings for the next pass that weigh more what ran out first.
 
     Parameters
@@ -147,13 +145,11 @@ def rebalanced(
         Its last nodes, at least one.
     problem : TourProblem
         What there was to use up.
-    gain : float
-        How strongly the logarithm of the weight follows the difference of the shares left.
     """
     time_left = 1.0 - (nodes.t_arr_mjd2000 - nodes.t_first_mjd2000) / problem.max_duration_days
     mass_left = (nodes.mass - problem.spacecraft.m_dry) / (problem.m0 - problem.spacecraft.m_dry)
     surplus = float((mass_left - time_left).mean())
-    weight = settings.propellant_weight * np.exp(-gain * surplus)
+    weight = settings.propellant_weight * np.exp(-_GAIN * surplus)
     low, high = (settings.time_weight * factor for factor in _WEIGHT_RANGE)
     if settings.time_weight > 0 and settings.propellant_weight > 0:
         weight = np.clip(weight, low, high)
