@@ -271,7 +271,7 @@ class _Search:
         """Return what sends out scouts; None where a search does without."""
         settings = self._settings
         wanted = settings.scout_generations if self._pacer is None else settings.scout_share
-        plain = (settings.ranking, settings.frontier) == ("weighted", "depth")
+        plain = settings.ranking in ("weighted", "balanced") and settings.frontier == "depth"
         if not (wanted and plain) or self._given_ranking is not None:
             return None
         if self._predictor is None or isinstance(self._problem, OwnMoves):

@@ -70,8 +70,9 @@ class SearchSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
         Pruned candidates of each rank that are optimised all the same, to learn what
         pruning costs, and half as many kept ones; 0 for no audit.
     ranking : str
-        Which nodes are better: ``"weighted"`` time and propellant, ``"pareto"`` fronts of
-        both, or ``"potential"``, weighted with a penalty for few ways on (needs a classifier).
+        Which nodes are better: ``"weighted"`` time and propellant, ``"balanced"``, where what
+        is scarcer counts more, ``"pareto"`` fronts of both, or ``"potential"``, weighted with a
+        penalty for few ways on (needs a classifier).
     potential_weight : float
         Penalty of a node without a way on, for the ranking ``"potential"``.
     frontier : str
@@ -85,7 +86,8 @@ class SearchSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
     scout_generations : int
         Where there is no time limit, how often four scouts are sent out before each pass,
         which then keeps to the best itineraries that they found; 0 for no scouts. They need a
-        predictor, ``ranking = "weighted"`` and ``frontier = "depth"``.
+        predictor, and ``ranking`` ``"weighted"`` or ``"balanced"`` with ``frontier = "depth"``.
+        Their own ranking is ``"balanced"``.
     scout_share : float
         Under a time limit, the share of each pass that is spent on scouting.
     scout_width : int
@@ -117,7 +119,7 @@ class SearchSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
     time_weight: Annotated[float, Meta(ge=0)] = 1.0
     propellant_weight: Annotated[float, Meta(ge=0)] = 0.6
     audit_per_rank: Annotated[int, Meta(ge=0)] = 100
-    ranking: Literal["weighted", "pareto", "potential"] = "weighted"
+    ranking: Literal["weighted", "balanced", "pareto", "potential"] = "weighted"
     potential_weight: Annotated[float, Meta(ge=0)] = 0.1
     frontier: Literal["depth", "time"] = "depth"
     slice_days: _Positive = 40.0

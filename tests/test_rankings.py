@@ -12,7 +12,7 @@ from feasibility.orbits import OrbitalNeighbours
 from seqsearch import search
 from seqsearch.nodes import Nodes
 from seqsearch.ranking import TimePropellantRanking
-from seqsearch.rankings import ParetoRanking, PotentialRanking, make_ranking
+from seqsearch.rankings import BalancedRanking, ParetoRanking, PotentialRanking, make_ranking
 from seqsearch.rankings.pareto import pareto_fronts
 from seqsearch.settings import SearchSettings
 from seqsearch.time_slices import TimeSliceFrontier
@@ -89,6 +89,30 @@ def test_pareto_ranking_puts_no_node_before_one_that_is_earlier_and_heavier(poin
             elapsed[i] <= elapsed[j] and nodes.mass[i] >= nodes.mass[j]
         ):
             assert score[i] < score[j]
+
+
+@given(_points)
+def test_balanced_ranking_is_the_sum_where_both_are_equally_scarce(points):
+    problem = small_problem()
+    elapsed, used = np.asarray(points, dtype=float).T
+    sums, balanced = TimePropellantRanking(1.0, 0.4), BalancedRanking(1.0, 0.4)
+    nodes = _nodes(problem, range(len(points)), [2] * len(points), elapsed, 1900 - used)
+    assert (balanced.score(nodes, problem) >= sums.score(nodes, problem) - 1e-12).all()
+    share = elapsed / problem.max_duration_days
+    even = _nodes(
+        problem, range(len(points)), [2] * len(points), elapsed, problem.m0 - 1200.0 * share
+    )
+    assert balanced.score(even, problem) == pytest.approx(sums.score(even, problem))
+
+
+def test_balanced_ranking_prefers_what_can_still_fly():
+    problem = small_problem()
+    left = problem.max_duration_days
+    nodes = _nodes(problem, [0, 1], [2, 2], [0.7 * left, 0.8 * left], [801.0, 1040.0])
+    assert np.argmin(TimePropellantRanking(1.0, 0.35).score(nodes, problem)) == 0
+    assert np.argmin(BalancedRanking(1.0, 0.35).score(nodes, problem)) == 1
+    empty = _nodes(problem, [0, 1], [2, 2], [left, 0.5 * left], [800.0, 800.0])
+    assert np.isfinite(BalancedRanking(1.0, 0.35).score(empty, problem)).all()
 
 
 @pytest.mark.parametrize(

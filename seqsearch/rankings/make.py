@@ -4,6 +4,7 @@ from feasibility import InputError
 from feasibility.orbits import OrbitalNeighbours
 from feasibility.pruners.predictor import LegPredictor
 from seqsearch.ranking import Ranking, TimePropellantRanking
+from seqsearch.rankings.balanced import BalancedRanking
 from seqsearch.rankings.pareto import ParetoRanking
 from seqsearch.rankings.potential import PotentialRanking
 from seqsearch.settings import SearchSettings
@@ -20,6 +21,8 @@ def make_ranking(
         The ranking needs a predictor and there is none.
     """
     weighted = TimePropellantRanking(settings.time_weight, settings.propellant_weight)
+    if settings.ranking == "balanced":
+        return BalancedRanking(settings.time_weight, settings.propellant_weight)
     if settings.ranking == "pareto":
         return ParetoRanking(weighted)
     if settings.ranking == "potential":

@@ -18,7 +18,7 @@ from feasibility.pruners.predictor import LegPredictor
 from seqsearch.counters import RankCounters
 from seqsearch.forecast import Forecast
 from seqsearch.nodes import Nodes
-from seqsearch.ranking import TimePropellantRanking
+from seqsearch.rankings.balanced import BalancedRanking
 from seqsearch.scouting.pool import Pool
 from seqsearch.scouting.regions import starts_near, window_part
 from seqsearch.scouting.scout import Scouted, scout
@@ -123,7 +123,7 @@ class Camp:
         Pool
             With what they found.
         """
-        ranking = TimePropellantRanking(settings.time_weight, settings.propellant_weight)
+        ranking = BalancedRanking(settings.time_weight, settings.propellant_weight)
         pool, orders = self._orders(pool, settings, scouts, rng, ranking)
         found = []
         for order, scouted in zip(orders, self._send(orders), strict=True):
@@ -140,7 +140,7 @@ class Camp:
         settings: SearchSettings,
         scouts: int,
         rng: np.random.Generator,
-        ranking: TimePropellantRanking,
+        ranking: BalancedRanking,
     ) -> tuple[Pool, list[_Order]]:
         explorers = scouts
         if len(pool) and pool.niches().max() + 1 >= _NICHES:

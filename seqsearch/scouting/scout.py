@@ -10,7 +10,7 @@ from seqsearch.expansion import reached
 from seqsearch.forecast import Forecast, Prospects
 from seqsearch.frontier import DepthFrontier
 from seqsearch.nodes import Nodes
-from seqsearch.ranking import TimePropellantRanking
+from seqsearch.rankings.balanced import BalancedRanking
 from seqsearch.settings import SearchSettings
 from seqsearch.tour_problem import TourProblem
 
@@ -74,7 +74,7 @@ def scout(
     settings : SearchSettings
         Width, caps and weights of the beam; neighbours and flight times are the scout's own.
     """
-    ranking = TimePropellantRanking(settings.time_weight, settings.propellant_weight)
+    ranking = BalancedRanking(settings.time_weight, settings.propellant_weight)
     counts = np.zeros(3, dtype=np.int64)
     nodes, before = _numbered(starts), starts
     while True:
