@@ -29,6 +29,7 @@ from seqsearch.ranking import Ranking, TimePropellantRanking
 from seqsearch.rankings import make_ranking
 from seqsearch.scouting.camp import Camp
 from seqsearch.scouting.guide import Guide, starts_of
+from seqsearch.scouting.scout import STRETCHES
 from seqsearch.settings import SearchSettings
 from seqsearch.starts import dense_starts, reachable_starts
 from seqsearch.state import SearchState
@@ -42,8 +43,12 @@ _SCOUTS: Final = 4
 _ITINERARIES: Final = 150
 """Itineraries that a pass optimises."""
 
-_VARIANTS: Final = 3
-"""Nodes of a guided pass for each itinerary: the same bodies at different epochs and masses."""
+_VARIANTS: Final = 4
+_LEAST_VARIANTS: Final = 200
+_VARIANT_DAYS: Final = 5.0
+"""Nodes of a guided pass for each itinerary, and for all together: the same bodies, some days
+apart and with other masses. The last legs may lack a day or a kilogram in one variant and not in
+another: with 3 nodes an itinerary, 20 days apart, a predicted 15th asteroid was not reached."""
 
 
 @final
@@ -337,7 +342,7 @@ class _Search:
         state = self._state
         ranking = self._make_ranking()
         expander = self._make_expander(ranking)
-        frontier = make_frontier(self._selecting(), self._problem, ranking)
+        frontier = make_frontier(self._of_pass(), self._problem, ranking)
         frontier.push(nodes)
         while len(nodes := frontier.pop()) and not self._out_of_budget():
             if self._pacer is not None and state.guide is None:
@@ -373,14 +378,19 @@ class _Search:
             self._report(frontier.waiting())
         state.waiting = None
 
-    def _selecting(self) -> SearchSettings:
-        """Return the settings by which nodes are selected: a guided pass keeps all itineraries."""
+    def _of_pass(self) -> SearchSettings:
+        """Return the settings of the pass: a guided one keeps all itineraries, in variants."""
         settings, guide = self._state.settings, self._state.guide
         if guide is None:
             return settings
-        width = _VARIANTS * len(guide)
+        width = max(_LEAST_VARIANTS, _VARIANTS * len(guide))
         return settings.with_(
-            beam_width=width, max_per_parent=width, max_per_cell=width, max_start_share=1.0
+            beam_width=width,
+            max_per_parent=width,
+            max_per_cell=width,
+            max_start_share=1.0,
+            cell_days=_VARIANT_DAYS,
+            flight_time_stretches=STRETCHES,
         )
 
     def _out_of_budget(self) -> bool:
@@ -389,7 +399,7 @@ class _Search:
 
     def _affordable(self) -> SearchSettings:
         """Return the settings of the pass, with no more solves than are left."""
-        settings = self._state.settings
+        settings = self._of_pass()
         if self._max_solves is None:
             return settings
         left = self._max_solves - self._state.solves

@@ -20,7 +20,7 @@ _NEIGHBOURS: Final = 16
 _FLIGHT_TIMES: Final = 5
 """Quick answers for a margin curve. On GTOC7 beams end alike with 5, 6 and 9."""
 
-_STRETCHES: Final = (1.0, 1.03, 1.07, 1.12, 1.18, 1.25, 1.4)
+STRETCHES: Final = (1.0, 1.03, 1.07, 1.12, 1.18, 1.25, 1.4)
 """Flight times in units of the shortest: finer than those that are optimised."""
 
 _SPARE: Final = 2.0
@@ -81,7 +81,7 @@ def scout(
         here = settings.with_(
             neighbours=min(_NEIGHBOURS, settings.neighbours),
             coarse_flight_times=_FLIGHT_TIMES,
-            flight_time_stretches=_STRETCHES,
+            flight_time_stretches=STRETCHES,
             beam_width=_width(nodes, problem, settings.beam_width),
         )
         surveys = list(forecast.surveys(nodes, here))
