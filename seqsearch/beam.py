@@ -28,8 +28,8 @@ from seqsearch.pruner_spec import parse_pruner, predictor_of
 from seqsearch.ranking import Ranking, TimePropellantRanking
 from seqsearch.rankings import make_ranking
 from seqsearch.scouting.camp import Camp
-from seqsearch.scouting.guide import Guide, starts_of
-from seqsearch.scouting.scout import STRETCHES
+from seqsearch.scouting.guide import Guide, guided, starts_of
+from seqsearch.scouting.season import season
 from seqsearch.settings import SearchSettings
 from seqsearch.starts import dense_starts, reachable_starts
 from seqsearch.state import SearchState
@@ -37,18 +37,8 @@ from seqsearch.tour import Tour
 from seqsearch.tour_problem import TourProblem
 from seqsearch.tree import SearchTree
 
-_SCOUTS: Final = 4
-"""Scouts sent out at a time; under a time limit two for each worker, if that is more."""
-
 _ITINERARIES: Final = 150
-"""Itineraries that a pass optimises."""
-
-_VARIANTS: Final = 4
-_LEAST_VARIANTS: Final = 200
-_VARIANT_DAYS: Final = 5.0
-"""Nodes of a guided pass for each itinerary, and for all together: the same bodies, some days
-apart and with other masses. The last legs may lack a day or a kilogram in one variant and not in
-another: with 3 nodes an itinerary, 20 days apart, a predicted 15th asteroid was not reached."""
+"""Itineraries that a pass optimises, where scouts found so many."""
 
 
 @final
@@ -287,25 +277,22 @@ class _Search:
         """Look for itineraries, to which the pass will keep; False where there were none."""
         state, pacer = self._state, self._pacer
         counters = RankCounters(pass_number=state.pass_number, rank=0)
-        began = time.monotonic()
-        pool, settings = state.pool, state.settings
-        scouts = _SCOUTS if pacer is None else max(_SCOUTS, 2 * self._threads)
-        budget_s = 0.0 if pacer is None else settings.scout_share * pacer.seconds_of_pass()
-        generations, slowest_s = 0, 0.0
-        while not self._out_of_budget():
-            spent_s = time.monotonic() - began
-            if pacer is not None and generations and spent_s + slowest_s > budget_s:
-                break
-            if pacer is None and generations == settings.scout_generations:
-                break
-            pool = camp.generation(pool, settings, scouts, self._rng, counters)
-            generations += 1
-            slowest_s = max(slowest_s, time.monotonic() - began - spent_s)
+        seconds = None
+        if pacer is not None:
+            seconds = state.settings.scout_share * pacer.seconds_of_pass()
+        pool = season(
+            camp,
+            state.pool,
+            state.settings,
+            self._rng,
+            counters,
+            seconds=seconds,
+            workers=self._threads,
+            over=self._out_of_budget,
+        )
         state.pool, guide = pool.unflown(_ITINERARIES)
         state.guide = guide if len(guide) else None
         counters.kept = len(guide)
-        counters.count_pruned({"predictor": counters.proposed - counters.nodes})
-        counters.seconds = time.monotonic() - began
         state.counters.append(counters)
         return state.guide is not None
 
@@ -379,19 +366,9 @@ class _Search:
         state.waiting = None
 
     def _of_pass(self) -> SearchSettings:
-        """Return the settings of the pass: a guided one keeps all itineraries, in variants."""
+        """Return the settings of the pass."""
         settings, guide = self._state.settings, self._state.guide
-        if guide is None:
-            return settings
-        width = max(_LEAST_VARIANTS, _VARIANTS * len(guide))
-        return settings.with_(
-            beam_width=width,
-            max_per_parent=width,
-            max_per_cell=width,
-            max_start_share=1.0,
-            cell_days=_VARIANT_DAYS,
-            flight_time_stretches=STRETCHES,
-        )
+        return settings if guide is None else guided(settings, len(guide))
 
     def _out_of_budget(self) -> bool:
         spent = self._max_solves is not None and self._state.solves >= self._max_solves
