@@ -137,6 +137,18 @@ def test_a_guided_pass_visits_nothing_but_its_itineraries(problem):
     assert reached == result.tour.n_asteroids - 1 > 0
 
 
+def test_under_a_time_limit_passes_begin_with_scouts(problem):
+    settings = small_settings(pruner="default:0.99", scout_width=10, tof_days_max=240.0)
+    result = search(problem, settings=settings, rng=np.random.default_rng(2), time_limit_s=6.0)
+    assert result.stopped == "time limit"
+    assert result.counters[0].rank == 0
+    assert result.tour.n_asteroids > 2
+    assert verify_tour(result.tour).passed
+    settings = settings.with_(scout_share=0.0)
+    result = search(problem, settings=settings, rng=np.random.default_rng(2), time_limit_s=2.0)
+    assert all(record.rank > 0 for record in result.counters)
+
+
 def test_scouts_in_other_processes_find_the_same(problem):
     def generation(executor):
         camp = Camp(problem, Toy(), small_settings(), executor)
