@@ -224,11 +224,12 @@ class _Search:
             if state.waiting is not None:
                 self._begin_pass()
                 self._run_pass(state.waiting)
-                state.guide = None
             while (
                 endless or state.pass_number < self._settings.passes
             ) and not self._out_of_budget():
                 state.pass_number += 1
+                # What was loaded at the end of a pass still names the guide of that pass.
+                state.guide = None
                 self._begin_pass()
                 scouted = self._camp is not None and self._scout(self._camp)
                 if self._out_of_budget():
@@ -237,7 +238,6 @@ class _Search:
                 if scouted:
                     self._report(nodes)
                 self._run_pass(nodes)
-                state.guide = None
         except KeyboardInterrupt:
             stopped = "interrupted"
         if stopped == "complete" and self._deadline.passed():

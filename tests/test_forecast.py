@@ -24,7 +24,7 @@ from tests.problems import small_problem, small_settings
 
 
 @dataclass(frozen=True)
-class _Toy:
+class Toy:
     """A margin that grows with the flight time and falls with the change of speed and the mass."""
 
     bias: float = 0.0
@@ -103,8 +103,8 @@ def test_one_good_answer_corrects_a_whole_curve():
 
 
 def test_proposed_times_are_the_shortest_that_can_be_flown(problem, neighbours):
-    assert isinstance(_Toy(), QuickPredictor)
-    predictor = _Toy(bias=0.04)
+    assert isinstance(Toy(), QuickPredictor)
+    predictor = Toy(bias=0.04)
     forecast = Forecast(problem, predictor, neighbours)
     settings = small_settings(neighbours=20, flight_time_stretches=(1.0, 1.2))
     nodes = _nodes(problem)
@@ -149,7 +149,7 @@ def test_answers_do_not_depend_on_threads(problem, neighbours):
     nodes = _nodes(problem, 8)
     found = []
     for threads in (1, 3):
-        forecast = Forecast(problem, _Toy(), neighbours, threads)
+        forecast = Forecast(problem, Toy(), neighbours, threads)
         prospects = Prospects.concatenate([s.prospects for s in forecast.surveys(nodes, settings)])
         found.append(forecast.outlook(nodes, prospects, settings))
     assert np.array_equal(found[0][1], found[1][1])
@@ -177,9 +177,9 @@ def test_targets_of_which_nothing_is_known_are_proposed_on_the_grid(problem):
 def test_starts_are_those_from_which_most_can_be_reached(problem, neighbours):
     settings = small_settings(starts=4, start_epochs=2, screen_legs=10**6)
     rng = np.random.default_rng(3)
-    rows, epochs = reachable_starts(problem, neighbours, _Toy(), settings, rng)
+    rows, epochs = reachable_starts(problem, neighbours, Toy(), settings, rng)
     again, _ = reachable_starts(
-        problem, neighbours, _Toy(), settings, np.random.default_rng(3), threads=2
+        problem, neighbours, Toy(), settings, np.random.default_rng(3), threads=2
     )
     assert np.array_equal(rows, again)
     assert len(set(rows)) == 4
@@ -193,7 +193,7 @@ def test_starts_are_those_from_which_most_can_be_reached(problem, neighbours):
                 zero = np.zeros(1, dtype=np.intp)
                 legs = problem.hops(node, zero, np.array([target]), np.array([epoch]), tof)
                 legs = legs.stages[0].with_m0(1400.0)
-                total += np.clip(1.0 + np.log(_Toy().margin(legs)[0]) / 0.3, 0.0, 1.0)
+                total += np.clip(1.0 + np.log(Toy().margin(legs)[0]) / 0.3, 0.0, 1.0)
         return total
 
     chosen = [count(row, epoch) for row, epoch in zip(rows, epochs, strict=True)]
@@ -217,4 +217,4 @@ def test_final_masses_lie_between_impulses_and_full_thrust():
     burnt = legs.thrust * legs.tof_s / legs.exhaust_velocity
     assert np.all(masses >= legs.m0 - burnt - 1e-9)
     assert masses[2] > masses[1]
-    assert isinstance(LambertPropellant(_Toy()), LegPredictor)
+    assert isinstance(LambertPropellant(Toy()), LegPredictor)

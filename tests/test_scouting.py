@@ -10,7 +10,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from feasibility.orbits import OrbitalNeighbours
-from feasibility.pruners.predictor import lambert_final_mass
 from seqsearch import search
 from seqsearch.counters import RankCounters
 from seqsearch.forecast import Forecast
@@ -24,22 +23,9 @@ from seqsearch.scouting.scout import scout
 from seqsearch.starts import dense_starts
 from seqsearch.verify import verify_tour
 from tests.problems import small_problem, small_settings
+from tests.test_forecast import Toy
 
 RANKING = TimePropellantRanking()
-
-
-@dataclass(frozen=True)
-class Toy:
-    """A margin that grows with the flight time and falls with the change of speed and the mass."""
-
-    def margin(self, legs, /):
-        speed_dep = np.linalg.norm(legs.rv_dep[:, 3:], axis=1)
-        speed_arr = np.linalg.norm(legs.rv_arr[:, 3:], axis=1)
-        gap = np.hypot(speed_arr - speed_dep, 300.0) / 3e3
-        return 1300.0 / (legs.m0 * (0.3 + gap)) * (legs.tof_days / 150.0) ** 1.2
-
-    def final_mass(self, legs, /):
-        return lambert_final_mass(legs)
 
 
 @pytest.fixture(scope="module")

@@ -50,12 +50,16 @@ beam's first rank does that: with 300 screened starts scouts ended later than wi
 @final
 @dataclass(frozen=True)
 class _Order:
-    """What one scout is told: its seed, and a part of the window or an itinerary."""
+    """What one scout is told: its seed, and a part of the window or an itinerary.
+
+    `picks` is how often the niche of that itinerary was picked.
+    """
 
     seed: int
     settings: SearchSettings
     window: tuple[float, float] | None
     near: Nodes | None
+    picks: int = 0
 
 
 @final
@@ -124,8 +128,7 @@ class Camp:
         pool, orders = self._orders(pool, settings, scouts, rng, ranking)
         found = []
         for order, scouted in zip(orders, self._send(orders), strict=True):
-            picks = 0 if order.near is None else self._picks_of(pool, order.near) // 2
-            found.append((scouted.leaves, picks))
+            found.append((scouted.leaves, order.picks // 2))
             counters.nodes += scouted.nodes
             counters.proposed += scouted.proposed
             counters.questions += scouted.questions
@@ -168,7 +171,8 @@ class Camp:
                 # found the 15th asteroid that five of nine found without.
                 changes |= {"max_start_share": 1.0}
                 row = rows[[k - explorers]]
-                orders.append(_Order(seed, settings.with_(**changes), None, pool.nodes.take(row)))
+                near, picks = pool.nodes.take(row), int(pool.picked[row[0]])
+                orders.append(_Order(seed, settings.with_(**changes), None, near, picks))
         return pool, orders
 
     def _send(self, orders: list[_Order]) -> list[Scouted]:
@@ -176,12 +180,6 @@ class Camp:
             return [_scouted(self._means, order) for order in orders]
         futures = [self._executor.submit(_scouted_there, self._packed, order) for order in orders]
         return [future.result() for future in futures]
-
-    @staticmethod
-    def _picks_of(pool: Pool, itinerary: Nodes) -> int:
-        width = min(pool.nodes.visited.shape[1], itinerary.visited.shape[1])
-        same = (pool.nodes.visited[:, :width] == itinerary.visited[:, :width]).all(axis=1)
-        return int(pool.picked[same].max(initial=0))
 
 
 @final
