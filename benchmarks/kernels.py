@@ -18,7 +18,7 @@ from feasibility.orbits import classical_to_cartesian, synthetic_main_belt
 from feasibility.orbits.kepler_kernels import propagate_batch, propagate_stm_batch
 from feasibility.orbits.lambert import lambert
 from feasibility.orbits.mima import mima2_branches, mima_branches
-from feasibility.pykep_guard import load_pykep
+from feasibility.runtime.pykep_guard import load_pykep
 
 THRUST, EXHAUST = 0.3, 30000.0
 REPEATS = 7

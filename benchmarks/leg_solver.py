@@ -29,12 +29,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility import Legs, Spacecraft
-from feasibility.dataset.impulsive import ImpulsiveGrid
-from feasibility.dataset.random_pairs import RandomPairs
-from feasibility.dataset.search_candidates import SearchCandidates
+from feasibility.dataset.samplers.impulsive import ImpulsiveGrid
+from feasibility.dataset.samplers.random_pairs import RandomPairs
+from feasibility.dataset.samplers.search_candidates import SearchCandidates
 from feasibility.orbits import Catalogue, read_catalogue, synthetic_main_belt
-from feasibility.sims_flanagan.fast import fast_max_initial_mass, fast_min_propellant
-from feasibility.sims_flanagan.reference import (
+from feasibility.sims_flanagan.fast.solver import fast_max_initial_mass, fast_min_propellant
+from feasibility.sims_flanagan.reference.solver import (
     reference_max_initial_mass,
     reference_min_propellant,
 )

@@ -16,7 +16,7 @@ import numpy as np
 
 from feasibility.constants import MU_SUN
 from feasibility.orbits import Catalogue, OrbitalNeighbours, synthetic_main_belt
-from feasibility.pykep_guard import load_pykep
+from feasibility.runtime.pykep_guard import load_pykep
 
 SIZES = {"GTOC7": 16_256, "GTOC11": 83_453}
 PYKEP_BODIES = 2000

@@ -25,14 +25,14 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
 from feasibility import Legs, Pruner
-from feasibility.classifier import FeasibilityClassifier
+from feasibility.classifier.classifier import FeasibilityClassifier
 from feasibility.constants import MU_SUN
 from feasibility.dataset import read_protocol
-from feasibility.learning.peers import NEURAL, known_peers
+from feasibility.evaluation.peers import NEURAL, known_peers
 from feasibility.orbits import synthetic_main_belt
 from feasibility.pruners import LambertPruner, Mima2Pruner, MimaPruner
 from feasibility.pruners.classifier import ClassifierPruner
-from feasibility.pykep_guard import load_pykep
+from feasibility.runtime.pykep_guard import load_pykep
 
 REPEATS = 5
 SINGLE_CALLS = 2000

@@ -24,20 +24,24 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from feasibility.atomic import write_text
-from feasibility.classifier import FeasibilityClassifier
-from feasibility.provenance import provenance
-from feasibility.sims_flanagan.prepare import compile_kernels, prefer_fast_compilation, sample_leg
-from feasibility.workers import worker_pool
-from seqsearch.audit_estimate import AuditEstimate
-from seqsearch.beam import search
-from seqsearch.cli import parse_duration
-from seqsearch.config import build_problem, read_config, with_catalogue
-from seqsearch.pruner_spec import parse_pruner
+from feasibility.classifier.classifier import FeasibilityClassifier
+from feasibility.runtime.atomic import write_text
+from feasibility.runtime.provenance import provenance
+from feasibility.runtime.workers import worker_pool
+from feasibility.sims_flanagan.fast.compilation import (
+    compile_kernels,
+    prefer_fast_compilation,
+    sample_leg,
+)
+from seqsearch.beam.beam_search import search
+from seqsearch.beam.state import SearchState
+from seqsearch.commands.cli import parse_duration
+from seqsearch.core.problem import TourProblem
+from seqsearch.problems.problem_file import build_problem, read_config, with_catalogue
+from seqsearch.pruning.audit_estimate import AuditEstimate
+from seqsearch.pruning.pruner_spec import parse_pruner
 from seqsearch.settings import SearchSettings
-from seqsearch.state import SearchState
-from seqsearch.tour_problem import TourProblem
-from seqsearch.verify import verify_tour
+from seqsearch.tours.verify import verify_tour
 
 UNPRUNED = "none"
 ALL = 10**9

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from sklearn.ensemble import HistGradientBoostingClassifier
 
 from feasibility import Legs, check_pruner, max_initial_mass
-from feasibility.learning.margin.features import log_acceleration, margin_features
+from feasibility.classifier.margin.features import log_acceleration, margin_features
 from feasibility.orbits import OrbitalNeighbours
 from seqsearch import Problem, SearchSettings, load_problem, search, verify_tour
 

@@ -11,7 +11,7 @@ from feasibility.errors import InputError, MissingDependencyError
 from feasibility.legs import Legs, Spacecraft
 
 if TYPE_CHECKING:
-    from feasibility.classifier import FeasibilityClassifier
+    from feasibility.classifier.classifier import FeasibilityClassifier
     from feasibility.pruners import (
         AllOf,
         ClassifierPruner,
@@ -29,7 +29,7 @@ __version__ = "0.1.0"
 _HOMES = {
     "AllOf": "feasibility.pruners",
     "ClassifierPruner": "feasibility.pruners",
-    "FeasibilityClassifier": "feasibility.classifier",
+    "FeasibilityClassifier": "feasibility.classifier.classifier",
     "KeepAll": "feasibility.pruners",
     "LambertPruner": "feasibility.pruners",
     "Mima2Pruner": "feasibility.pruners",

@@ -7,30 +7,30 @@ import importlib
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from seqsearch.beam import SearchResult, search
-    from seqsearch.config import build_problem, load_problem, read_config
-    from seqsearch.problem import Problem
-    from seqsearch.ranking import Ranking, TimePropellantRanking
+    from seqsearch.beam.beam_search import SearchResult, search
+    from seqsearch.beam.rankings.protocol import Ranking, TimePropellantRanking
+    from seqsearch.problems.problem_file import build_problem, load_problem, read_config
+    from seqsearch.problems.rendezvous import Problem
     from seqsearch.settings import SearchSettings
-    from seqsearch.tour import Tour, read_tour
-    from seqsearch.verify import Verification, verify_tour
+    from seqsearch.tours.tour import Tour, read_tour
+    from seqsearch.tours.verify import Verification, verify_tour
 
 __version__ = "0.1.0"
 
 _HOMES = {
-    "Problem": "seqsearch.problem",
-    "Ranking": "seqsearch.ranking",
-    "SearchResult": "seqsearch.beam",
+    "Problem": "seqsearch.problems.rendezvous",
+    "Ranking": "seqsearch.beam.rankings.protocol",
+    "SearchResult": "seqsearch.beam.beam_search",
     "SearchSettings": "seqsearch.settings",
-    "TimePropellantRanking": "seqsearch.ranking",
-    "Tour": "seqsearch.tour",
-    "Verification": "seqsearch.verify",
-    "build_problem": "seqsearch.config",
-    "load_problem": "seqsearch.config",
-    "read_config": "seqsearch.config",
-    "read_tour": "seqsearch.tour",
-    "search": "seqsearch.beam",
-    "verify_tour": "seqsearch.verify",
+    "TimePropellantRanking": "seqsearch.beam.rankings.protocol",
+    "Tour": "seqsearch.tours.tour",
+    "Verification": "seqsearch.tours.verify",
+    "build_problem": "seqsearch.problems.problem_file",
+    "load_problem": "seqsearch.problems.problem_file",
+    "read_config": "seqsearch.problems.problem_file",
+    "read_tour": "seqsearch.tours.tour",
+    "search": "seqsearch.beam.beam_search",
+    "verify_tour": "seqsearch.tours.verify",
 }
 
 __all__ = [

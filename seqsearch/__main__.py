@@ -2,7 +2,7 @@
 
 import sys
 
-from seqsearch.cli import main
+from seqsearch.commands.cli import main
 
 if __name__ == "__main__":
     sys.exit(main())

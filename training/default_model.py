@@ -22,12 +22,12 @@ from pathlib import Path
 
 import msgspec
 
-from feasibility.cli import main as feasibility
+from feasibility.commands.cli import main as feasibility
 from feasibility.dataset import read_protocol
 from feasibility.dataset.generate import begin
 from feasibility.dataset.protocol import Protocol, SpacecraftTable
 from feasibility.learning.margin.hard_examples import harder
-from feasibility.workers import worker_pool
+from feasibility.runtime.workers import worker_pool
 
 TRAINING_SEED, TEST_SEED = 11, 7001
 PROPELLANT_SEED, PROPELLANT_TEST_SEED = 12, 7002

@@ -18,10 +18,10 @@ from pathlib import Path
 import numpy as np
 
 from feasibility import FeasibilityClassifier
-from feasibility.atomic import atomic_path, write_text
 from feasibility.dataset import Dataset, read_dataset
-from feasibility.learning.evaluate import evaluate
+from feasibility.evaluation.evaluate import evaluate
 from feasibility.learning.margin.train import MarginRecipe, train_margin
+from feasibility.runtime.atomic import atomic_path, write_text
 
 TESTS = ("search", "table1", "nea")
 SHOWN = {

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.legs import Legs
-from feasibility.sims_flanagan.pygmo_problems import MinimumPropellantProblem
 from feasibility.sims_flanagan.pykep_leg import N_SEGMENTS, confirm, scaled_leg
+from feasibility.sims_flanagan.reference.pygmo_problems import MinimumPropellantProblem
 from feasibility.sims_flanagan.solutions import (
     MISMATCH_TOLERANCE,
     THROTTLE_TOLERANCE,

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, final
 
-from feasibility.dataset.draws import Columns
 from feasibility.dataset.labels import ShardTask, file_sha256, load_catalogue, make_shard
 from feasibility.dataset.protocol import Protocol
+from feasibility.dataset.samplers.draws import Columns
 from feasibility.dataset.storage import (
     METADATA,
     has_shard,
@@ -22,7 +22,7 @@ from feasibility.dataset.storage import (
     write_shard,
 )
 from feasibility.errors import InputError
-from feasibility.provenance import provenance
+from feasibility.runtime.provenance import provenance
 
 _RECIPE: Final = ("protocol", "seed", "catalogue")
 """Parts of the metadata that decide the rows."""

@@ -7,9 +7,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.atomic import atomic_path
 from feasibility.dataset.dataset import Dataset, read_dataset
 from feasibility.errors import InputError
+from feasibility.runtime.atomic import atomic_path
 from feasibility.sims_flanagan import Status, solve_max_initial_mass
 
 PICTURE: Final = "margin.png"

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from feasibility.dataset.columns import ARRIVAL_STATE, DEPARTURE_STATE
 from feasibility.dataset.convergence import converge_from_random_start
-from feasibility.dataset.draws import Columns, Draw
-from feasibility.dataset.impulsive import lowest_delta_v
 from feasibility.dataset.protocol import CatalogueTable, Protocol
+from feasibility.dataset.samplers.draws import Columns, Draw
+from feasibility.dataset.samplers.impulsive import lowest_delta_v
 from feasibility.errors import InputError
 from feasibility.legs import Legs
 from feasibility.orbits import Catalogue, read_catalogue, synthetic_main_belt

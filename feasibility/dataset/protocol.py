@@ -7,10 +7,10 @@ from typing import Annotated, Any, Literal, final
 import msgspec
 from msgspec import Meta
 
-from feasibility.dataset.any_spacecraft import AnySpacecraft
-from feasibility.dataset.impulsive import ImpulsiveGrid
-from feasibility.dataset.random_pairs import RandomPairs
-from feasibility.dataset.search_candidates import SearchCandidates
+from feasibility.dataset.samplers.any_spacecraft import AnySpacecraft
+from feasibility.dataset.samplers.impulsive import ImpulsiveGrid
+from feasibility.dataset.samplers.random_pairs import RandomPairs
+from feasibility.dataset.samplers.search_candidates import SearchCandidates
 from feasibility.errors import InputError
 from feasibility.legs import Spacecraft
 
@@ -120,7 +120,7 @@ class Protocol(_Table, frozen=True, kw_only=True):
 
 def builtin_protocols() -> dict[str, str]:
     """Return the names of the built-in protocols and their TOML texts."""
-    folder = resources.files("feasibility") / "protocols"
+    folder = resources.files("feasibility.dataset") / "protocols"
     return {
         entry.name.removesuffix(".toml"): entry.read_text(encoding="utf-8")
         for entry in sorted(folder.iterdir(), key=lambda entry: entry.name)

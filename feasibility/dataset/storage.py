@@ -10,9 +10,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.atomic import atomic_path, write_text
 from feasibility.dataset.columns import COLUMNS
 from feasibility.errors import InputError, MissingDependencyError
+from feasibility.runtime.atomic import atomic_path, write_text
 
 FORMAT: Final = 1
 """Version of the layout; readers refuse others."""

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.constants import DAY_S
-from feasibility.jit import inner_kernel, kernel
+from feasibility.runtime.jit import inner_kernel, kernel
 
 N_COLUMNS: Final = 10
 ECCENTRICITY: Final = 0

@@ -20,7 +20,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.jit import inner_kernel, kernel
+from feasibility.runtime.jit import inner_kernel, kernel
 
 _Array = NDArray[np.float64]
 

@@ -26,9 +26,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.jit import inner_kernel, kernel
 from feasibility.orbits.kepler_kernels import kepler_secular, solve_kepler
 from feasibility.orbits.lambert_kernels import lambert
+from feasibility.runtime.jit import inner_kernel, kernel
 
 _Array = NDArray[np.float64]
 # Of the Lambert arc at departure: distance, radial and transverse velocity, 2 mu / r - v^2.

@@ -38,7 +38,7 @@ and goes wherever a pruner is asked for, also inside `AllOf`.
 Any scikit-learn model is one with ten lines. `margin_features` gives inputs that fit any
 spacecraft; add thrust over mass, which they leave out.
 
->>> from feasibility.learning.margin.features import log_acceleration, margin_features
+>>> from feasibility.classifier.margin.features import log_acceleration, margin_features
 >>> @dataclass(frozen=True)
 ... class ModelPruner:
 ...     model: object  # fitted, with predict_proba(X) -> (n, 2)

@@ -6,10 +6,10 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.classifier import FeasibilityClassifier
+from feasibility.classifier.classifier import FeasibilityClassifier
 from feasibility.errors import InputError
 from feasibility.legs import Legs
-from feasibility.workers import own_threads
+from feasibility.runtime.workers import own_threads
 
 
 @final

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from feasibility.constants import AU, EARTH_VELOCITY
 from feasibility.legs import Legs
-from feasibility.pykep_guard import load_pykep
+from feasibility.runtime.pykep_guard import load_pykep
 
 TIME_UNIT_S: Final = AU / EARTH_VELOCITY
 """Time unit of scaled legs in seconds: a year at 1 AU is 2 pi of them."""

@@ -16,12 +16,12 @@ DEFAULT_METHOD: Final = "fast"
 
 _HOME = "feasibility.sims_flanagan"
 _MAXIMUM_MASS: Final = {
-    "fast": f"{_HOME}.fast:fast_max_initial_mass",
-    "reference": f"{_HOME}.reference:reference_max_initial_mass",
+    "fast": f"{_HOME}.fast.solver:fast_max_initial_mass",
+    "reference": f"{_HOME}.reference.solver:reference_max_initial_mass",
 }
 _MINIMUM_PROPELLANT: Final = {
-    "fast": f"{_HOME}.fast:fast_min_propellant",
-    "reference": f"{_HOME}.reference:reference_min_propellant",
+    "fast": f"{_HOME}.fast.solver:fast_min_propellant",
+    "reference": f"{_HOME}.reference.solver:reference_min_propellant",
 }
 
 

@@ -19,13 +19,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility import Legs
+from feasibility.classifier.predictor import LegPredictor
 from feasibility.constants import DAY_S
 from feasibility.orbits import OrbitalNeighbours
 from feasibility.orbits.lambert import lambert
-from feasibility.pruners.predictor import LegPredictor
 from seqsearch.polish.flight import Flight
 from seqsearch.polish.itinerary import Itinerary
-from seqsearch.problem import Problem
+from seqsearch.problems.rendezvous import Problem
 
 _Array = NDArray[np.float64]
 _Index = NDArray[np.intp]

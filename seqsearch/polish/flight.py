@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 
 from feasibility import Legs, LegSolutions, optimise
 from feasibility.sims_flanagan import solve_max_initial_mass
+from seqsearch.core.tree import FlownLeg, SearchTree
 from seqsearch.polish.itinerary import Itinerary
-from seqsearch.problem import Problem
-from seqsearch.tour import Tour
-from seqsearch.tree import FlownLeg, SearchTree
+from seqsearch.problems.rendezvous import Problem
+from seqsearch.tours.tour import Tour
 
 _Array = NDArray[np.float64]
 

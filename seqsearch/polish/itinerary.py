@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from feasibility import Legs
-from seqsearch.problem import Problem
-from seqsearch.tour import Tour
+from seqsearch.problems.rendezvous import Problem
+from seqsearch.tours.tour import Tour
 
 
 @final

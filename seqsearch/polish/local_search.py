@@ -16,13 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility import InputError
-from feasibility.pruners.predictor import LegPredictor
+from feasibility.classifier.predictor import LegPredictor
 from seqsearch.deadline import Deadline
 from seqsearch.polish.extension import Extender, Extension, ExtensionSettings
 from seqsearch.polish.itinerary import Itinerary
 from seqsearch.polish.retiming import Retimed, retime
-from seqsearch.problem import Problem
-from seqsearch.tour import Tour
+from seqsearch.problems.rendezvous import Problem
+from seqsearch.tours.tour import Tour
 
 _QUICK_ITERATIONS: Final = 5
 _THOROUGH_ITERATIONS: Final = 12

@@ -20,7 +20,7 @@ from scipy.sparse import coo_array
 
 from seqsearch.polish.flight import Flight, Tangents, fly, tangents
 from seqsearch.polish.itinerary import Itinerary
-from seqsearch.problem import Problem
+from seqsearch.problems.rendezvous import Problem
 
 _Array = NDArray[np.float64]
 

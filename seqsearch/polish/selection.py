@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from seqsearch.problem import Problem
-from seqsearch.tour import Tour
-from seqsearch.tree import SearchTree
+from seqsearch.core.tree import SearchTree
+from seqsearch.problems.rendezvous import Problem
+from seqsearch.tours.tour import Tour
 
 _LARGEST_SHARE_ALIKE = 0.7
 """Of two tours with more than this share of bodies in common, one is enough."""

@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from feasibility.atomic import atomic_path
-from feasibility.learning.artefact import Artefact
+from feasibility.classifier.artefact import Artefact
+from feasibility.runtime.atomic import atomic_path
 
 
 def draw_learning_curve(artefact: Artefact, path: Path) -> None:

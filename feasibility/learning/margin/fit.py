@@ -11,10 +11,10 @@ from typing import Any, Final, final
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.atomic import atomic_path
+from feasibility.classifier.margin.network import INPUT_LIMIT
 from feasibility.errors import InputError
-from feasibility.learning.extra import load_extra
-from feasibility.learning.margin.network import INPUT_LIMIT
+from feasibility.runtime.atomic import atomic_path
+from feasibility.runtime.extras import load_extra
 
 _Array = NDArray[np.float64]
 

@@ -8,10 +8,10 @@ import msgspec
 import numpy as np
 from numpy.random import Generator
 
-from feasibility.classifier import FeasibilityClassifier
-from feasibility.dataset.draws import Draw
-from feasibility.dataset.impulsive import ImpulsiveGrid
+from feasibility.classifier.classifier import FeasibilityClassifier
 from feasibility.dataset.protocol import Protocol
+from feasibility.dataset.samplers.draws import Draw
+from feasibility.dataset.samplers.impulsive import ImpulsiveGrid
 from feasibility.legs import Spacecraft
 from feasibility.orbits import Catalogue
 

@@ -8,16 +8,13 @@ from typing import Any, Final, final
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.dataset import Dataset
-from feasibility.errors import InputError
-from feasibility.learning.artefact import Artefact
-from feasibility.learning.folds import split_pairs
-from feasibility.learning.margin.calibration import (
+from feasibility.classifier.artefact import Artefact
+from feasibility.classifier.margin.calibration import (
     Calibration,
     boundary_scores,
     fit_calibration,
 )
-from feasibility.learning.margin.features import (
+from feasibility.classifier.margin.features import (
     FEATURE_SET,
     FEATURES,
     domain_quantities,
@@ -25,10 +22,13 @@ from feasibility.learning.margin.features import (
     margin_features,
     quick_features,
 )
+from feasibility.classifier.margin.network import MarginNet
+from feasibility.dataset import Dataset
+from feasibility.dataset.folds import split_pairs
+from feasibility.dataset.pairs import pairs_of_bodies
+from feasibility.errors import InputError
 from feasibility.learning.margin.fit import MarginEpoch, MarginRecipe, OnEpoch, fit_net
-from feasibility.learning.margin.network import MarginNet
-from feasibility.learning.margin.pairs import pairs_of_bodies
-from feasibility.provenance import provenance
+from feasibility.runtime.provenance import provenance
 
 _Array = NDArray[np.float64]
 

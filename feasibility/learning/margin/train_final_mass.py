@@ -7,20 +7,20 @@ from typing import Final
 
 import numpy as np
 
-from feasibility.dataset import Dataset
-from feasibility.errors import InputError
-from feasibility.learning.artefact import Artefact
-from feasibility.learning.folds import split_pairs
-from feasibility.learning.margin.estimator import MarginEstimator
-from feasibility.learning.margin.features import margin_features
-from feasibility.learning.margin.fit import UNIT, MarginRecipe, OnEpoch, fit_net
-from feasibility.learning.margin.network import MarginNet
-from feasibility.learning.margin.pairs import pairs_of_bodies
-from feasibility.learning.margin.propellant import (
+from feasibility.classifier.artefact import Artefact
+from feasibility.classifier.margin.estimator import MarginEstimator
+from feasibility.classifier.margin.features import margin_features
+from feasibility.classifier.margin.final_mass import (
     FINAL_MASS_INPUTS,
     final_mass_inputs,
     full_thrust_velocity,
 )
+from feasibility.classifier.margin.network import MarginNet
+from feasibility.dataset import Dataset
+from feasibility.dataset.folds import split_pairs
+from feasibility.dataset.pairs import pairs_of_bodies
+from feasibility.errors import InputError
+from feasibility.learning.margin.fit import UNIT, MarginRecipe, OnEpoch, fit_net
 
 FINAL_MASS_RECIPE: Final = MarginRecipe(layers=3, width=96, epochs=40, batch=256)
 """A small net is enough: 35 000 legs give the final mass to a seventh of a percent."""

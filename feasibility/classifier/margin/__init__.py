@@ -1,0 +1,1 @@
+"""The margin model as it is asked: features, network, calibration, margins and final masses."""

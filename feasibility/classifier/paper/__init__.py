@@ -1,0 +1,1 @@
+"""The paper's models as they are asked: 103 features and predictors without scikit-learn."""

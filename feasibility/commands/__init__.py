@@ -1,0 +1,1 @@
+"""The command feasibility: one file a sub-command."""

@@ -1,0 +1,111 @@
+"""The command ``feasibility assess``."""
+
+import argparse
+import json
+import tempfile
+from pathlib import Path
+from typing import Any, Final
+
+from feasibility.errors import InputError
+
+_DESCRIPTION: Final = """\
+Say whether a model is good enough for your spacecraft: draw legs of it, solve
+them, and compare the model's answers with the solver's.
+
+  feasibility assess probe.toml --catalogue asteroids.txt
+
+Half of the legs get a mass near the heaviest possible, as those of good tours
+have; balanced accuracy is that of the others. Shares come with intervals that
+hold with probability 0.95.
+
+The verdict is "good enough" where at least 95 % of the legs are in the model's
+domain, balanced accuracy is at least 0.99, at least 97 % of the legs within
+15 % of the boundary are told rightly, and the interval of the pruner's recall
+reaches the recall asked for; "retrain" otherwise, with what falls short; "too
+few legs" with less than 50 legs of a class or 100 within 15 % of the boundary.
+
+The spacecraft is a TOML file with these keys:
+
+"""
+
+
+def add_parser(commands: Any) -> None:
+    """Add the command to the parser's sub-commands."""
+    from feasibility.spacecraft.spacecraft_file import EXAMPLE
+
+    parser = commands.add_parser(
+        "assess",
+        help="is a model good enough for your spacecraft?",
+        description=_DESCRIPTION + EXAMPLE,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("spacecraft", metavar="SPACECRAFT.toml", help="the spacecraft")
+    parser.add_argument(
+        "--catalogue",
+        nargs="+",
+        default=[],
+        metavar="FILE",
+        help="asteroid tables, used evenly (default: a synthetic main belt)",
+    )
+    parser.add_argument("--model", default="default", help="the model (default: the package's)")
+    parser.add_argument(
+        "--recall", type=float, default=0.99, help="of the pruner that is judged (default: 0.99)"
+    )
+    parser.add_argument(
+        "--legs", type=int, default=1500, metavar="N", help="legs to solve (default: 1500)"
+    )
+    parser.add_argument("--seed", type=int, default=0, help="seed of the draws (default: 0)")
+    parser.add_argument("--workers", type=int, help="processes (default: one a core)")
+    parser.add_argument("--out", metavar="FILE", help="write all figures as JSON")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Do what the command line asks for and return the exit code, 0 whatever the verdict.
+
+    Raises
+    ------
+    InputError
+        Input that cannot be used.
+    """
+    from feasibility.classifier.classifier import FeasibilityClassifier
+    from feasibility.runtime.atomic import write_text
+    from feasibility.runtime.provenance import provenance
+    from feasibility.spacecraft.assess import assess
+    from feasibility.spacecraft.legs import make, parts_of
+    from feasibility.spacecraft.spacecraft_file import read_spacecraft
+
+    check_numbers(options, "legs", "workers")
+    craft = read_spacecraft(options.spacecraft)
+    classifier = FeasibilityClassifier.load(options.model)
+    classifier.threshold(options.recall)
+    print(f"{craft.name}: solving {options.legs} legs", flush=True)
+    parts = parts_of(craft, options.catalogue, options.legs, options.seed, "sample")
+    with tempfile.TemporaryDirectory() as folder:
+        sample = make(parts, Path(folder), options.workers)
+    outcome = assess(classifier, sample, options.recall)
+    print(outcome.text(), end="")
+    if outcome.verdict == "retrain":
+        print(f"  feasibility retrain {options.spacecraft} may help")
+    if options.out is not None:
+        record = {
+            "spacecraft": craft.to_dict(),
+            "model": Path(options.model).name,
+            "legs": options.legs,
+            "seed": options.seed,
+            **outcome.to_dict(),
+            "provenance": provenance(),
+        }
+        write_text(Path(options.out), json.dumps(record, indent=1) + "\n")
+        print(f"wrote {options.out}")
+    return 0
+
+
+def check_numbers(options: argparse.Namespace, *names: str) -> None:
+    """Raise InputError where a count is not positive or the seed is negative."""
+    for name in names:
+        value = getattr(options, name)
+        if value is not None and value < 1:
+            raise InputError(f"--{name.replace('_', '-')} {value}: expected one or more")
+    if options.seed < 0:
+        raise InputError(f"--seed {options.seed}: expected zero or more")

@@ -1,0 +1,283 @@
+"""The command ``feasibility train``."""
+
+import argparse
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Final
+
+from feasibility.errors import InputError
+
+_DESCRIPTION: Final = """\
+Train a classifier on the labelled legs of a dataset and save it as one file,
+which a search loads as a pruner.
+
+The legs are split by pairs of bodies into training (80 %), validation and
+calibration (10 % each). Features are ranked by an ensemble of trees and the
+first of them taken, standardised, the classes balanced if asked for. A network
+writes a checkpoint after each epoch beside the model; run the command again to
+go on after an interruption.
+
+The model "margin" learns the maximum initial mass instead, for any spacecraft, from one or
+more datasets; the learning curve is drawn beside it. "final-mass" adds to such a model, given by
+--start, the mass at arrival with least propellant; the rest of the model stays as it is. Its
+datasets have propellant = true in their protocol.
+
+  feasibility train data/search data/table1 data/general --model margin --out any.seqmodel
+  feasibility train data/flown --model final-mass --start any.seqmodel --out whole.seqmodel
+  feasibility train data/table1 --preset dnn1 --out dnn1.seqmodel
+  feasibility train data/table1 --model ensemble --balance adasyn
+  seqsearch run gtoc7 --pruner dnn1.seqmodel:0.99
+"""
+
+_MODELS: Final = ("margin", "final-mass", "dnn", "ensemble", "knn", "svm", "tree")
+_DEFAULT_FEATURES: Final = 60
+
+
+def add_parser(commands: Any) -> None:
+    """Add the command to the parser's sub-commands."""
+    parser = commands.add_parser(
+        "train",
+        help="train a classifier",
+        description=_DESCRIPTION,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument(
+        "dataset",
+        nargs="+",
+        metavar="DATASET",
+        help="folder of a dataset; several for margin and final-mass",
+    )
+    parser.add_argument("--model", choices=_MODELS, help="kind of model (default: dnn)")
+    parser.add_argument(
+        "--preset",
+        choices=("dnn1", "dnn2"),
+        help="the paper's optimised network with 60 or with all 103 features",
+    )
+    parser.add_argument(
+        "--features", type=int, metavar="K", help="how many features (default: 60, dnn2: 103)"
+    )
+    parser.add_argument(
+        "--balance",
+        choices=("none", "adasyn"),
+        default="none",
+        help="fill up the smaller class of the training part (default: none)",
+    )
+    parser.add_argument("--epochs", type=int, help="epochs of a network")
+    parser.add_argument(
+        "--patience",
+        type=int,
+        metavar="N",
+        help="stop a network when the validation loss has not fallen for N epochs, keep its best",
+    )
+    parser.add_argument("--device", choices=("cpu", "cuda", "auto"), help="where a network trains")
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        help="any other hyperparameter, such as width=200; may be given several times",
+    )
+    parser.add_argument(
+        "--start", metavar="FILE", help='margin model that final-mass is added to, or "default"'
+    )
+    parser.add_argument("--seed", type=int, default=0, help="seed of everything (default: 0)")
+    parser.add_argument(
+        "--out", metavar="FILE", help="the model (default: MODEL.seqmodel, or PRESET.seqmodel)"
+    )
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Do what the command line asks for and return the exit code.
+
+    Raises
+    ------
+    InputError
+        Options that contradict each other, or a dataset that cannot be used.
+    """
+    if options.preset is not None and options.model not in (None, "dnn"):
+        raise InputError(f"--preset {options.preset}: is a dnn, but --model is {options.model}")
+    if options.seed < 0:
+        raise InputError(f"--seed {options.seed}: expected zero or more")
+    name = options.preset or options.model or "dnn"
+    out = Path(options.out or f"{name}.seqmodel")
+    if not out.parent.is_dir():
+        raise InputError(f"--out {out}: no folder {out.parent}")
+    if (name == "final-mass") != (options.start is not None):
+        raise InputError("--start: goes with --model final-mass, which needs it")
+    if name == "margin":
+        return _train_margin(options, out)
+    if name == "final-mass":
+        return _train_final_mass(options, out)
+    if len(options.dataset) > 1:
+        raise InputError(
+            f"{len(options.dataset)} datasets: only --model margin and final-mass take several"
+        )
+    return _train(options, name, out)
+
+
+def _train_margin(options: argparse.Namespace, out: Path) -> int:
+    from feasibility.dataset import read_dataset
+    from feasibility.learning.margin.curves import draw_learning_curve
+    from feasibility.learning.margin.train import MarginRecipe, train_margin
+
+    settings = _margin_settings(options)
+    try:
+        recipe = MarginRecipe(**settings, seed=options.seed)
+    except TypeError as error:
+        raise InputError(f"--set: {error}") from None
+    checkpoint = out.with_name(out.name + ".checkpoint")
+    artefact = train_margin(
+        [read_dataset(folder) for folder in options.dataset],
+        recipe,
+        checkpoint=checkpoint,
+        on_epoch=_print_margin_epoch,
+    )
+    artefact.save(out)
+    checkpoint.unlink(missing_ok=True)
+    curve = out.with_suffix(".png")
+    draw_learning_curve(artefact, curve)
+    legs = artefact.config["legs"]
+    print(
+        f"{legs['training']} legs for training, {legs['validation']} for validation, "
+        f"{legs['calibration']} for calibration"
+    )
+    measures = artefact.metrics["calibration"]
+    print(
+        "calibration legs: error of log m*, median "
+        f"{measures['median_absolute_log_error']:.5f}, mean "
+        f"{measures['mean_absolute_log_error']:.5f} (hint alone: median "
+        f"{measures['hint_median_absolute_log_error']:.5f})"
+    )
+    print(f"wrote {out} and {curve}")
+    return 0
+
+
+def _train_final_mass(options: argparse.Namespace, out: Path) -> int:
+    from feasibility.classifier.classifier import FeasibilityClassifier
+    from feasibility.dataset import read_dataset
+    from feasibility.learning.margin.train_final_mass import FINAL_MASS_RECIPE, train_final_mass
+
+    settings = _margin_settings(options)
+    try:
+        recipe = replace(FINAL_MASS_RECIPE, **settings, seed=options.seed)
+    except TypeError as error:
+        raise InputError(f"--set: {error}") from None
+    checkpoint = out.with_name(out.name + ".checkpoint")
+    artefact = train_final_mass(
+        FeasibilityClassifier.load(options.start).artefact,
+        [read_dataset(folder) for folder in options.dataset],
+        recipe,
+        checkpoint=checkpoint,
+        on_epoch=_print_margin_epoch,
+    )
+    artefact.save(out)
+    checkpoint.unlink(missing_ok=True)
+    measures = artefact.metrics["final_mass"]
+    print(
+        f"{measures['legs']} legs for training; validation legs: relative error of the final "
+        f"mass, median {measures['median_relative_error']:.5f}, "
+        f"mean {measures['mean_relative_error']:.5f}"
+    )
+    print(f"wrote {out}")
+    return 0
+
+
+def _margin_settings(options: argparse.Namespace) -> dict[str, Any]:
+    """Return what the options set for a net of a margin model.
+
+    Raises
+    ------
+    InputError
+        An option of the other models.
+    """
+    for name in ("preset", "features"):
+        if getattr(options, name) is not None:
+            raise InputError(f"--{name}: is not for --model {options.model}")
+    if options.balance != "none":
+        raise InputError(
+            f"--balance: is not for --model {options.model}, which learns masses, not classes"
+        )
+    settings = _hyperparameters(options, network=True)
+    settings.pop("keep_best", None)
+    return settings
+
+
+def _print_margin_epoch(epoch: Any) -> None:
+    print(
+        f"epoch {epoch.number:>3}: training loss {epoch.train_loss:.5f}, "
+        f"validation loss {epoch.validation_loss:.5f}",
+        flush=True,
+    )
+
+
+def _train(options: argparse.Namespace, name: str, out: Path) -> int:
+    from feasibility.dataset import read_dataset
+    from feasibility.learning.paper.models import PRESETS
+    from feasibility.learning.paper.train import Recipe, train
+
+    n_features = options.features
+    if n_features is None:
+        n_features = PRESETS[name][1] if name in PRESETS else _DEFAULT_FEATURES
+    recipe = Recipe(
+        model=name,
+        hyperparameters=_hyperparameters(options, network=name in ("dnn", *PRESETS)),
+        n_features=n_features,
+        balance=options.balance,
+        seed=options.seed,
+    )
+    checkpoint = out.with_name(out.name + ".checkpoint")
+    artefact = train(
+        read_dataset(options.dataset[0]), recipe, checkpoint=checkpoint, on_epoch=_print_epoch
+    )
+    artefact.save(out)
+    checkpoint.unlink(missing_ok=True)
+    legs = artefact.config["legs"]
+    print(
+        f"{legs['training']} legs for training, {legs['synthetic']} synthetic ones, "
+        f"{legs['validation']} for validation, {legs['calibration']} for calibration"
+    )
+    measures = artefact.metrics["validation"]
+    shown = ("accuracy", "precision", "recall", "f1", "f10", "auc", "balanced_accuracy")
+    print("validation: " + ", ".join(f"{measure} {measures[measure]:.4f}" for measure in shown))
+    print(f"wrote {out}")
+    return 0
+
+
+def _hyperparameters(options: argparse.Namespace, *, network: bool) -> dict[str, Any]:
+    """Return what the options set.
+
+    Raises
+    ------
+    InputError
+        An option of networks for another model, or ``--set`` without a value.
+    """
+    given = {
+        name: getattr(options, name)
+        for name in ("epochs", "patience", "device")
+        if getattr(options, name) is not None
+    }
+    if given and not network:
+        raise InputError(f"--{next(iter(given))}: is for networks, but --model is {options.model}")
+    if "patience" in given:
+        given["keep_best"] = True
+    for setting in options.set:
+        name, equals, value = setting.partition("=")
+        if not equals:
+            raise InputError(f"--set {setting}: expected NAME=VALUE")
+        try:
+            given[name] = json.loads(value)
+        except ValueError:
+            given[name] = value
+    return given
+
+
+def _print_epoch(epoch: Any) -> None:
+    print(
+        f"epoch {epoch.number:>3}: rate {epoch.learning_rate:.2e}, "
+        f"training loss {epoch.train_loss:.4f} accuracy {epoch.train_accuracy:.4f}, "
+        f"validation loss {epoch.validation_loss:.4f} accuracy {epoch.validation_accuracy:.4f}, "
+        f"{epoch.seconds:.1f} s",
+        flush=True,
+    )

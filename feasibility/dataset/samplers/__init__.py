@@ -1,0 +1,1 @@
+"""Samplers: from which distribution the legs of a dataset are drawn."""

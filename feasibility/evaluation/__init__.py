@@ -1,0 +1,1 @@
+"""Judging classifiers: metrics, tables and the peers beside which they stand."""

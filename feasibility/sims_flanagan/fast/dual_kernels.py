@@ -1,0 +1,447 @@
+"""The linearised leg: least thrust that closes a gap, by its six-dimensional dual."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.runtime.jit import inner_kernel
+from feasibility.sims_flanagan.fast.algebra_kernels import (
+    cholesky,
+    solve_lower,
+    solve_lower_transposed,
+)
+from feasibility.sims_flanagan.fast.workspace_kernels import (
+    HESSIAN,
+    HESSIAN_LOWER,
+    NORM,
+    PINNED,
+    PRIMER,
+    SLOPE,
+    THRUST,
+    TRIAL_NORM,
+    TRIAL_PRIMER,
+    TURNED,
+    Workspace,
+    Y,
+)
+
+_DUAL_ITERATIONS = 40
+_SOFTNESS = 1e-3
+_FULL = 0.995
+_LARGEST = 2.0
+_BACKWARD_LIMIT = 0.367
+
+_Array = NDArray[np.float64]
+
+
+@inner_kernel
+def full_thrust_profile(z: float, n: int, n_forward: int, y: _Array, slope: _Array) -> None:
+    """Write impulses over exhaust velocity, y_i, at full thrust, and their derivative by z.
+
+    z = T dt / (m0 c). Forward half (mass before the impulse): y = z_i; backward
+    half (mass after it): y exp(-y) = z_i; both z_(i+1) = z_i exp(y_i). Beyond
+    z_i = 1/e the convention sets a backward impulse no limit at all (the mass
+    left is as small as it needs to be); there y = 1.
+    """
+    zi = z
+    dz = 1.0
+    for i in range(n):
+        if i < n_forward:
+            zi = min(zi, _LARGEST)
+            y[i] = zi
+            slope[i] = dz
+            grow = math.exp(zi)
+            dz = dz * grow * (1.0 + zi)
+            zi = zi * grow
+        elif zi > _BACKWARD_LIMIT:
+            y[i] = 1.0
+            slope[i] = 0.0
+        else:
+            yi = zi * (1.0 + zi * (1.0 + 1.5 * zi))
+            for _ in range(20):
+                grow = math.exp(yi)
+                step = (yi - zi * grow) / (1.0 - yi)
+                yi = min(yi - step, 0.999)
+                if abs(step) < 1e-12:
+                    break
+            grow = math.exp(yi)
+            dz = dz * grow / (1.0 - yi)
+            y[i] = yi
+            slope[i] = dz
+            zi = yi
+
+
+@inner_kernel
+def z_of_impulses(dv: _Array, n: int, n_forward: int, c: float) -> float:
+    """Return the smallest z = T dt / (m0 c) at which the impulses need no throttle above 1.
+
+    m0 exp(-S_i / c) |dv_i| <= T dt with S_i the sum of the impulses before
+    segment i, in the backward half including it.
+    """
+    total = 0.0
+    z = 0.0
+    for i in range(n):
+        y = math.sqrt(dv[i, 0] ** 2 + dv[i, 1] ** 2 + dv[i, 2] ** 2) / c
+        if i < n_forward:
+            z = max(z, y * math.exp(-total))
+            total += y
+        else:
+            total += y
+            z = max(z, y * math.exp(-total))
+    return z
+
+
+@inner_kernel
+def whiten(b: _Array, n: int, gram: _Array, lower: _Array) -> bool:
+    """Overwrite each b_i (6, 3) with L^-1 b_i, where L L^T = sum b_i b_i^T; return whether it can.
+
+    In whitened coordinates the norm of a gap is the least impulse that closes it.
+    """
+    for i in range(6):
+        for j in range(i + 1):
+            total = 0.0
+            for k in range(n):
+                total += (
+                    b[k, i, 0] * b[k, j, 0] + b[k, i, 1] * b[k, j, 1] + b[k, i, 2] * b[k, j, 2]
+                )
+            gram[i, j] = total
+    if not cholesky(gram, lower):
+        return False
+    for k in range(n):
+        for col in range(3):
+            for i in range(6):
+                total = b[k, i, col]
+                for j in range(i):
+                    total -= lower[i, j] * b[k, j, col]
+                b[k, i, col] = total / lower[i, i]
+    return True
+
+
+@inner_kernel
+def _primers(
+    b: _Array, lam: _Array, n: int, thrust: _Array, pinned: _Array, primer: _Array, norm: _Array
+) -> None:
+    """Write b_i^T lam and the softened norms sqrt(|b_i^T lam|^2 + eps^2).
+
+    For a pinned segment the "norm" is the work done along its given direction.
+    """
+    mean = 0.0
+    for i in range(n):
+        total = 0.0
+        for j in range(3):
+            p = 0.0
+            for k in range(6):
+                p += b[i, k, j] * lam[k]
+            primer[i, j] = p
+            total += p * p
+        norm[i] = total
+        mean += total
+    eps2 = _SOFTNESS * _SOFTNESS * mean / n
+    for i in range(n):
+        if pinned[i] > 0.0:
+            norm[i] = 0.0
+            for j in range(3):
+                norm[i] += primer[i, j] * thrust[i, j]
+        else:
+            norm[i] = math.sqrt(norm[i] + eps2)
+
+
+@inner_kernel
+def _bound(
+    norm: _Array, work: float, z: float, n: int, n_forward: int, c: float, y: _Array, slope: _Array
+) -> float:
+    """Return the z at which full thrust along the primers just does `work`: c sum y_i |p_i|."""
+    for _ in range(30):
+        full_thrust_profile(z, n, n_forward, y, slope)
+        done = 0.0
+        rate = 0.0
+        for i in range(n):
+            done += c * y[i] * norm[i]
+            rate += c * slope[i] * norm[i]
+        step = (work - done) / rate
+        z += min(max(step, -0.5 * z), z)
+        if abs(step) < 1e-9 * z:
+            break
+    return z
+
+
+@inner_kernel
+def _curvature(
+    b: _Array,
+    n: int,
+    c: float,
+    y: _Array,
+    primer: _Array,
+    norm: _Array,
+    thrust: _Array,
+    pinned: _Array,
+    lam: _Array,
+    h: _Array,
+    grad: _Array,
+    turned: _Array,
+) -> None:
+    """Add to `grad` (6,) the impulses' effect c y_i b_i p_i / |p_i|; write the Newton matrix h."""
+    for i in range(6):
+        for j in range(i + 1):
+            h[i, j] = 0.0
+    for k in range(n):
+        u0, u1, u2 = thrust[k, 0], thrust[k, 1], thrust[k, 2]
+        if pinned[k] > 0.0:
+            for i in range(6):
+                grad[i] += c * y[k] * (b[k, i, 0] * u0 + b[k, i, 1] * u1 + b[k, i, 2] * u2)
+            continue
+        inverse = 1.0 / norm[k]
+        weight = c * y[k] * inverse
+        p0, p1, p2 = primer[k, 0] * inverse, primer[k, 1] * inverse, primer[k, 2] * inverse
+        for i in range(6):
+            b0, b1, b2 = b[k, i, 0], b[k, i, 1], b[k, i, 2]
+            along = b0 * p0 + b1 * p1 + b2 * p2
+            turn = b0 * u0 + b1 * u1 + b2 * u2
+            turned[0, i] = along
+            turned[1, i] = turn
+            grad[i] += c * y[k] * along
+            for j in range(i + 1):
+                h[i, j] += weight * (
+                    b0 * b[k, j, 0]
+                    + b1 * b[k, j, 1]
+                    + b2 * b[k, j, 2]
+                    - 0.5 * (along * turned[1, j] + turn * turned[0, j])
+                )
+    trace = 0.0
+    for i in range(6):
+        trace += h[i, i]
+    # No curvature along lam itself, whose length is fixed.
+    for i in range(6):
+        for j in range(i + 1):
+            h[i, j] += trace * lam[i] * lam[j]
+        h[i, i] += 1e-10 * trace
+
+
+@inner_kernel
+def _climb(
+    b: _Array, gap: _Array, n: int, n_forward: int, c: float, lam: _Array, z: float, w: Workspace
+) -> float:
+    """Raise z(lam) by damped Newton steps from `lam` (norm 1); return z, -1 where it fails."""
+    primer, trial_primer, thrust = w.n3[PRIMER], w.n3[TRIAL_PRIMER], w.n3[THRUST]
+    norm, trial_norm, y, slope = w.s[NORM], w.s[TRIAL_NORM], w.s[Y], w.s[SLOPE]
+    pinned = w.s[PINNED]
+    h, lower, turned = w.m[HESSIAN], w.m[HESSIAN_LOWER], w.m[TURNED]
+    grad, step, trial = turned[2], turned[3], turned[4]
+    work = 0.0
+    for i in range(6):
+        work += lam[i] * gap[i]
+    _primers(b, lam, n, thrust, pinned, primer, norm)
+    z = _bound(norm, work, z, n, n_forward, c, y, slope)
+    for i in range(n):
+        if pinned[i] == 0.0:
+            for j in range(3):
+                thrust[i, j] = primer[i, j] / norm[i]
+    for _ in range(_DUAL_ITERATIONS):
+        for i in range(6):
+            grad[i] = -gap[i]
+        _curvature(b, n, c, y, primer, norm, thrust, pinned, lam, h, grad, turned)
+        along = 0.0
+        for i in range(6):
+            along += lam[i] * grad[i]
+        for i in range(6):
+            grad[i] -= along * lam[i]
+            step[i] = -grad[i]
+        if not cholesky(h, lower):
+            return -1.0
+        solve_lower(lower, step)
+        solve_lower_transposed(lower, step)
+        decrement = 0.0
+        for i in range(6):
+            decrement -= step[i] * grad[i]
+        if not decrement > 1e-8 * work:
+            break
+        fraction = 1.0
+        better = False
+        for _ in range(12):
+            size = 0.0
+            for i in range(6):
+                trial[i] = lam[i] + fraction * step[i]
+                size += trial[i] * trial[i]
+            size = math.sqrt(size)
+            trial_work = 0.0
+            for i in range(6):
+                trial[i] /= size
+                trial_work += trial[i] * gap[i]
+            if trial_work > 0.0:
+                _primers(b, trial, n, thrust, pinned, trial_primer, trial_norm)
+                trial_z = _bound(trial_norm, trial_work, z, n, n_forward, c, y, slope)
+                if trial_z > z:
+                    better = True
+                    break
+            fraction *= 0.5
+        if not better:
+            break
+        for k in range(n):
+            if pinned[k] == 0.0:
+                _turn_thrust(b[k], step, fraction, primer[k], norm[k], thrust[k])
+        z = trial_z
+        work = trial_work
+        for i in range(6):
+            lam[i] = trial[i]
+        for i in range(n):
+            norm[i] = trial_norm[i]
+            for j in range(3):
+                primer[i, j] = trial_primer[i, j]
+    full_thrust_profile(z, n, n_forward, y, slope)
+    return z
+
+
+@inner_kernel
+def _turn_thrust(
+    b: _Array, step: _Array, fraction: float, primer: _Array, norm: float, thrust: _Array
+) -> None:
+    """Let a thrust direction follow its own linearisation, kept inside the unit ball."""
+    d0 = d1 = d2 = 0.0
+    for i in range(6):
+        d0 += b[i, 0] * step[i]
+        d1 += b[i, 1] * step[i]
+        d2 += b[i, 2] * step[i]
+    along = (primer[0] * d0 + primer[1] * d1 + primer[2] * d2) / norm
+    thrust[0] += fraction * ((d0 + primer[0] - along * thrust[0]) / norm - thrust[0])
+    thrust[1] += fraction * ((d1 + primer[1] - along * thrust[1]) / norm - thrust[1])
+    thrust[2] += fraction * ((d2 + primer[2] - along * thrust[2]) / norm - thrust[2])
+    size = math.sqrt(thrust[0] ** 2 + thrust[1] ** 2 + thrust[2] ** 2)
+    if size > 1.0:
+        for j in range(3):
+            thrust[j] /= size
+
+
+@inner_kernel
+def _pin_direction(b: _Array, lower: _Array, turned: _Array, u: _Array) -> None:
+    """Move `u` (3,), shorter than 1, to the unit vector that the others make up for most cheaply.
+
+    Least (v - u)^T Q (v - u) over |v| = 1 with Q = b^T H^-1 b: (Q + tau) v = Q u with
+    -q_min < tau < 0, found by bisection.
+    """
+    for j in range(3):
+        for i in range(6):
+            turned[j, i] = b[i, j]
+        solve_lower(lower, turned[j])
+    q00 = q01 = q02 = q11 = q12 = q22 = 0.0
+    for i in range(6):
+        q00 += turned[0, i] * turned[0, i]
+        q01 += turned[0, i] * turned[1, i]
+        q02 += turned[0, i] * turned[2, i]
+        q11 += turned[1, i] * turned[1, i]
+        q12 += turned[1, i] * turned[2, i]
+        q22 += turned[2, i] * turned[2, i]
+    g0 = q00 * u[0] + q01 * u[1] + q02 * u[2]
+    g1 = q01 * u[0] + q11 * u[1] + q12 * u[2]
+    g2 = q02 * u[0] + q12 * u[1] + q22 * u[2]
+    low = -min(q00, q11, q22)
+    high = 0.0
+    v0, v1, v2 = u[0], u[1], u[2]
+    for _ in range(50):
+        tau = 0.5 * (low + high)
+        a00 = q00 + tau
+        a11 = q11 + tau
+        a22 = q22 + tau
+        c00 = a11 * a22 - q12 * q12
+        c01 = q02 * q12 - q01 * a22
+        c02 = q01 * q12 - q02 * a11
+        det = a00 * c00 + q01 * c01 + q02 * c02
+        if a00 > 0.0 and a00 * a11 > q01 * q01 and det > 0.0:
+            c11 = a00 * a22 - q02 * q02
+            c12 = q01 * q02 - a00 * q12
+            c22 = a00 * a11 - q01 * q01
+            t0 = (c00 * g0 + c01 * g1 + c02 * g2) / det
+            t1 = (c01 * g0 + c11 * g1 + c12 * g2) / det
+            t2 = (c02 * g0 + c12 * g1 + c22 * g2) / det
+            if t0 * t0 + t1 * t1 + t2 * t2 <= 1.0:
+                high = tau
+                v0, v1, v2 = t0, t1, t2
+                continue
+        low = tau
+    size = math.sqrt(v0 * v0 + v1 * v1 + v2 * v2)
+    if size > 0.0:
+        u[0], u[1], u[2] = v0 / size, v1 / size, v2 / size
+
+
+@inner_kernel
+def least_thrust(
+    b: _Array,
+    gap: _Array,
+    n: int,
+    n_forward: int,
+    c: float,
+    lam: _Array,
+    z: float,
+    now: _Array,
+    dv: _Array,
+    w: Workspace,
+) -> float:
+    """Solve: least z with sum b_i dv_i = gap and |dv_i| = c y_i(z); write dv; return z or -1.
+
+    The dual is the largest z(lam) over 6-vectors lam, where z(lam) solves
+    c sum y_i(z) |b_i^T lam| = lam . gap. At its optimum some b_i^T lam may well be
+    zero, where the thrust turns round, so the norms are softened and the Newton
+    steps are those of Andersen, Christiansen, Conn and Overton 2000 ("An efficient
+    primal-dual interior-point method for minimizing a sum of Euclidean norms"),
+    which carry the thrust directions as unknowns of their own.
+
+    Such a segment would thrust partly; but a lighter spacecraft may be heavier at
+    the start, so it pays to thrust fully even there, in the direction that the other
+    segments make up for most cheaply; `now` settles its sign where both are alike.
+
+    `b` and `gap` are whitened; `lam` holds the first guess and receives the
+    solution, norm 1.
+    """
+    primer, thrust = w.n3[PRIMER], w.n3[THRUST]
+    norm, y, pinned = w.s[NORM], w.s[Y], w.s[PINNED]
+    h, lower, turned = w.m[HESSIAN], w.m[HESSIAN_LOWER], w.m[TURNED]
+    z = min(z, 0.5 / n) if z > 0.0 else 0.5 / n
+    work = 0.0
+    for i in range(6):
+        work += lam[i] * gap[i]
+    if not work > 0.0:
+        for i in range(6):
+            lam[i] = gap[i]
+    size = 0.0
+    for i in range(6):
+        size += lam[i] * lam[i]
+    size = math.sqrt(size)
+    if not (0.0 < size < np.inf):
+        return -1.0
+    for i in range(6):
+        lam[i] /= size
+    for i in range(n):
+        pinned[i] = 0.0
+    z = _climb(b, gap, n, n_forward, c, lam, z, w)
+    if not z > 0.0:
+        return -1.0
+    some = False
+    for i in range(n):
+        total = 0.0
+        for j in range(3):
+            thrust[i, j] = primer[i, j] / norm[i]
+            total += thrust[i, j] ** 2
+        if total < _FULL * _FULL:
+            pinned[i] = 1.0
+            some = True
+    if some:
+        _curvature(b, n, c, y, primer, norm, thrust, pinned, lam, h, turned[5], turned)
+        if not cholesky(h, lower):
+            return -1.0
+        for i in range(n):
+            if pinned[i] > 0.0:
+                size = 1e-300
+                for j in range(3):
+                    size += abs(now[i, j])
+                for j in range(3):
+                    thrust[i, j] += 1e-7 * now[i, j] / size
+                _pin_direction(b[i], lower, turned, thrust[i])
+        z = _climb(b, gap, n, n_forward, c, lam, z, w)
+        if not z > 0.0:
+            return -1.0
+    for i in range(n):
+        for j in range(3):
+            if pinned[i] == 0.0:
+                thrust[i, j] = primer[i, j] / norm[i]
+            dv[i, j] = c * y[i] * thrust[i, j]
+    return z

@@ -1,0 +1,378 @@
+"""The second-order finish: Newton's method on the thrust directions of a closed arc.
+
+At the maximum initial mass every segment thrusts fully, so the arc is a function of its
+thrust directions and of z, and the optimum is where the primers B_i^T lambda are
+along (or against) the thrust. Linearisation alone crawls, or stops, where the curvature
+of the dynamics outweighs that of the thrust bound: where primers are short.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.orbits.kepler_kernels import propagate, propagate_stm
+from feasibility.runtime.jit import inner_kernel, kernel
+from feasibility.sims_flanagan.fast.algebra_kernels import (
+    cholesky,
+    solve_lower,
+    solve_lower_transposed,
+)
+from feasibility.sims_flanagan.fast.arc_kernels import linearise, whitened_gap
+from feasibility.sims_flanagan.fast.dual_kernels import full_thrust_profile, z_of_impulses
+from feasibility.sims_flanagan.fast.element_kernels import element_derivatives
+from feasibility.sims_flanagan.fast.workspace_kernels import (
+    D_MOVED,
+    D_RESIDUAL,
+    GAP,
+    HESSIAN,
+    HESSIAN_LOWER,
+    LAM,
+    LOWER,
+    M_ONE,
+    SLOPE,
+    STEP,
+    TOTAL,
+    TRIAL_GAP,
+    TRIAL_LAM,
+    WORK,
+    Workspace,
+    X,
+    Y,
+)
+
+_DIFFERENCE = 1e-4
+_DAMPINGS = 12
+_STIFF = 10.0
+_ITERATIONS = 12
+_GAIN = 2e-5
+_FIRST_DAMPING = 0.03
+_CLOSED = 1e-9
+_CORRECTIONS = 12
+_LARGEST_TURN = 1.5
+_LARGEST_RISE = 1.03
+# Rows of Workspace.n3 that belong to Anderson's rule, which is at rest here.
+_U, _FIRST, _SECOND, _PRIMER, _TRIAL_U, _ARC = range(D_RESIDUAL, D_RESIDUAL + 6)
+
+_Array = NDArray[np.float64]
+
+
+@kernel
+def factor(table: _Array, size: int, shift: float) -> bool:
+    """Write the Cholesky factor of the matrix in the first `size` rows, `shift` added, below it.
+
+    Returns whether the matrix is positive definite; only its lower triangle is read.
+    """
+    for i in range(size):
+        for j in range(i + 1):
+            total = table[i, j]
+            if i == j:
+                total += shift
+            for k in range(j):
+                total -= table[size + i, k] * table[size + j, k]
+            if i == j:
+                if not total > 0.0:
+                    return False
+                table[size + i, i] = math.sqrt(total)
+            else:
+                table[size + i, j] = total / table[size + j, j]
+    return True
+
+
+@kernel
+def solve_columns(table: _Array, size: int) -> None:
+    """Write into the six columns right of the factor its solutions for the six above them."""
+    for q in range(size, size + 6):
+        for i in range(size):
+            total = table[i, q]
+            for k in range(i):
+                total -= table[size + i, k] * table[size + k, q]
+            table[size + i, q] = total / table[size + i, i]
+        for i in range(size - 1, -1, -1):
+            total = table[size + i, q]
+            for k in range(i + 1, size):
+                total -= table[size + k, i] * table[size + k, q]
+            table[size + i, q] = total / table[size + i, i]
+
+
+@inner_kernel
+def _stiffness(
+    table: _Array, size: int, below: int, pull: _Array, gram: _Array, lower: _Array
+) -> float:
+    """Write and factor the response of the end to turns, M = A W^-1 A^T + ease a a^T.
+
+    At the optimum turns alone move the end in five dimensions only, A^T lambda = 0: the
+    sixth is left to z. Returns the weight of z, 0 where there is no factor.
+    """
+    trace = 0.0
+    square = 0.0
+    for q in range(6):
+        for p in range(q + 1):
+            total = 0.0
+            for row in range(size):
+                total += table[row, size + q] * table[below + row, size + p]
+            gram[q, p] = total
+        trace += gram[q, q]
+        square += pull[q] * pull[q]
+    ease = trace / square
+    for q in range(6):
+        for p in range(q + 1):
+            gram[q, p] += ease * pull[q] * pull[p]
+    return ease if cholesky(gram, lower) else 0.0
+
+
+@inner_kernel
+def _tangents(u: _Array, first: _Array, second: _Array) -> None:
+    """Write two unit vectors across the unit vector `u`."""
+    axis = int(0)
+    for j in range(3):
+        if abs(u[j]) < abs(u[axis]):
+            axis = j
+    size = math.sqrt(1.0 - u[axis] * u[axis])
+    for j in range(3):
+        first[j] = ((1.0 if j == axis else 0.0) - u[axis] * u[j]) / size
+    second[0] = u[1] * first[2] - u[2] * first[1]
+    second[1] = u[2] * first[0] - u[0] * first[2]
+    second[2] = u[0] * first[1] - u[1] * first[0]
+
+
+@inner_kernel
+def _thrust(
+    u: _Array, z: float, n: int, n_forward: int, c: float, arc: _Array, w: Workspace
+) -> None:
+    """Write the impulses of full thrust along the unit vectors `u`."""
+    full_thrust_profile(z, n, n_forward, w.s[Y], w.s[SLOPE])
+    for i in range(n):
+        for j in range(3):
+            arc[i, j] = c * w.s[Y, i] * u[i, j]
+
+
+@inner_kernel
+def _turn(table: _Array, nu: _Array, n: int, u: _Array, trial: _Array, w: Workspace) -> float:
+    """Write the directions `u` turned by the step of the multipliers `nu`; return the largest."""
+    largest = 0.0
+    for i in range(n):
+        t0 = t1 = 0.0
+        for q in range(6):
+            t0 -= table[2 * n + 2 * i, 2 * n + q] * nu[q]
+            t1 -= table[2 * n + 2 * i + 1, 2 * n + q] * nu[q]
+        size = 0.0
+        for j in range(3):
+            trial[i, j] = u[i, j] + t0 * w.n3[_FIRST, i, j] + t1 * w.n3[_SECOND, i, j]
+            size += trial[i, j] * trial[i, j]
+        size = math.sqrt(size)
+        for j in range(3):
+            trial[i, j] /= size
+        largest = max(largest, abs(t0), abs(t1))
+    return largest
+
+
+@inner_kernel
+def _curvature(
+    x0: _Array, n: int, dt: float, c: float, lam: _Array, table: _Array, w: Workspace
+) -> bool:
+    """Write the Hessian of the Lagrangian in the tangent steps; return False where it cannot.
+
+    By differences of the primers: a disturbed impulse changes the arc after it only.
+    """
+    arc, primer, y = w.n3[_ARC], w.n3[_PRIMER], w.s[Y]
+    states, x, psi, jacobian = w.n6[D_MOVED], w.v[X], w.v[WORK], w.m[M_ONE]
+    propagate(x0, 0.5 * dt, 1.0, x)
+    for i in range(n):
+        for j in range(6):
+            states[i, j] = x[j]
+        for j in range(3):
+            x[3 + j] += arc[i, j]
+        propagate(x, dt, 1.0, x)
+    for row in range(2 * n):
+        i = row // 2
+        across = w.n3[_FIRST if row % 2 == 0 else _SECOND, i]
+        for j in range(6):
+            x[j] = states[i, j]
+        for j in range(3):
+            x[3 + j] += c * y[i] * _DIFFERENCE * across[j]
+        for k in range(i, n):
+            for j in range(3):
+                x[3 + j] += arc[k, j]
+            propagate_stm(x, dt if k < n - 1 else 0.5 * dt, 1.0, x, w.m[k])
+        if not element_derivatives(x, int(0), jacobian, w.v):
+            return False
+        for j in range(6):
+            psi[j] = 0.0
+            for q in range(6):
+                psi[j] += jacobian[q, j] * lam[q]
+        for k in range(n - 1, i - 1, -1):
+            for j in range(6):
+                x[j] = psi[j]
+            for j in range(6):
+                psi[j] = 0.0
+                for q in range(6):
+                    psi[j] += w.m[k, q, j] * x[q]
+            scale = c * y[k] / _DIFFERENCE
+            d0 = scale * (psi[3] - primer[k, 0])
+            d1 = scale * (psi[4] - primer[k, 1])
+            d2 = scale * (psi[5] - primer[k, 2])
+            table[2 * k, row] = (
+                d0 * w.n3[_FIRST, k, 0] + d1 * w.n3[_FIRST, k, 1] + d2 * w.n3[_FIRST, k, 2]
+            )
+            table[2 * k + 1, row] = (
+                d0 * w.n3[_SECOND, k, 0] + d1 * w.n3[_SECOND, k, 1] + d2 * w.n3[_SECOND, k, 2]
+            )
+        along = 0.0
+        for j in range(3):
+            along += primer[i, j] * w.n3[_U, i, j]
+        table[row, row] -= c * y[i] * along
+    return True
+
+
+@inner_kernel
+def polish(
+    x0: _Array,
+    dv: _Array,
+    n: int,
+    n_forward: int,
+    dt: float,
+    c: float,
+    target: _Array,
+    w: Workspace,
+) -> float:
+    """Lower z of the closed arc `dv` by Newton steps on its thrust directions; return its z.
+
+    Least z with the arc closed, in the tangent steps t_i of the directions and in z. The
+    Hessian of the Lagrangian is damped (Levenberg 1944) until it is positive definite and
+    the step, closed again by its own metric, lowers z.
+    """
+    size = 2 * n
+    table = np.empty((2 * size, size + 6))
+    u, trial, arc, primer = w.n3[_U], w.n3[_TRIAL_U], w.n3[_ARC], w.n3[_PRIMER]
+    y, slope, b = w.s[Y], w.s[SLOPE], w.b[0]
+    gap, trial_gap, lam, lam_end = w.v[GAP], w.v[TRIAL_GAP], w.v[LAM], w.v[TRIAL_LAM]
+    pull, rise = w.v[TOTAL], w.v[STEP]
+    gram, lower = w.m[HESSIAN], w.m[HESSIAN_LOWER]
+    z0 = z_of_impulses(dv, n, n_forward, c)
+    z = z0
+    for i in range(n):
+        length = 1e-300
+        for j in range(3):
+            length += dv[i, j] ** 2
+        for j in range(3):
+            u[i, j] = dv[i, j] / math.sqrt(length)
+    bound = _LARGEST_RISE * z
+    best = z0
+    damping = 0.0
+    for _ in range(_ITERATIONS):
+        _thrust(u, z, n, n_forward, c, arc, w)
+        if not linearise(x0, arc, n, dt, target, w, gap) < np.inf:
+            break
+        for q in range(6):
+            pull[q] = 0.0
+        for i in range(n):
+            _tangents(u[i], w.n3[_FIRST, i], w.n3[_SECOND, i])
+            for q in range(6):
+                t0 = t1 = along = 0.0
+                for j in range(3):
+                    along += b[i, q, j] * u[i, j]
+                    t0 += b[i, q, j] * w.n3[_FIRST, i, j]
+                    t1 += b[i, q, j] * w.n3[_SECOND, i, j]
+                pull[q] += c * slope[i] * along
+                table[2 * i, size + q] = c * y[i] * t0
+                table[2 * i + 1, size + q] = c * y[i] * t1
+        # Multipliers by least squares on the primers' components across the thrust.
+        for q in range(6):
+            lam[q] = pull[q]
+        if not _stiffness(table, size, int(0), pull, gram, lower) > 0.0:
+            break
+        solve_lower(lower, lam)
+        solve_lower_transposed(lower, lam)
+        total = 0.0
+        for q in range(6):
+            total += pull[q] * lam[q]
+        for q in range(6):
+            lam[q] /= -total
+            lam_end[q] = lam[q]
+        solve_lower_transposed(w.m[LOWER], lam_end)
+        mean = 0.0
+        for i in range(n):
+            long = 0.0
+            for j in range(3):
+                total = 0.0
+                for q in range(6):
+                    total += b[i, q, j] * lam[q]
+                primer[i, j] = total
+                long += total * total
+            mean += c * y[i] * math.sqrt(long) / n
+        if not _curvature(x0, n, dt, c, lam_end, table, w):
+            break
+        # Positive definite is asked of turns that keep the end only: the others are stiffened.
+        total = 0.0
+        for row in range(size):
+            for q in range(6):
+                total += table[row, size + q] ** 2
+        stiff = _STIFF * mean * size / total
+        for row in range(size):
+            for col in range(row + 1):
+                total = 0.0
+                for q in range(6):
+                    total += table[row, size + q] * table[col, size + q]
+                table[row, col] += stiff * total
+        accepted = False
+        for _ in range(_DAMPINGS):
+            if factor(table, size, damping * mean):
+                solve_columns(table, size)
+                ease = _stiffness(table, size, size, pull, gram, lower)
+                if not ease > 0.0:
+                    break
+                for q in range(6):
+                    rise[q] = pull[q]
+                    lam[q] = gap[q]
+                solve_lower(lower, rise)
+                solve_lower_transposed(lower, rise)
+                solve_lower(lower, lam)
+                solve_lower_transposed(lower, lam)
+                along = 0.0
+                total = 1.0
+                for q in range(6):
+                    along += pull[q] * rise[q]
+                    total += pull[q] * lam[q]
+                dz = ease - total / along
+                for q in range(6):
+                    lam[q] += (dz - ease) * rise[q]
+                new_z = z + dz
+                if abs(dz) < 0.3 * z and _turn(table, lam, n, u, trial, w) < _LARGEST_TURN:
+                    closed = False
+                    before = np.inf
+                    for _ in range(_CORRECTIONS):
+                        _thrust(trial, new_z, n, n_forward, c, arc, w)
+                        miss = whitened_gap(x0, arc, n, dt, target, w, trial_gap)
+                        if miss < _CLOSED:
+                            closed = True
+                            break
+                        if not miss < 0.5 * before:
+                            break
+                        before = miss
+                        solve_lower(lower, trial_gap)
+                        solve_lower_transposed(lower, trial_gap)
+                        _turn(table, trial_gap, n, trial, trial, w)
+                        for q in range(6):
+                            new_z -= ease * pull[q] * trial_gap[q]
+                    if closed and new_z < bound:
+                        accepted = True
+                        break
+            damping = max(2.5 * damping, _FIRST_DAMPING)
+        if not accepted:
+            break
+        gain = bound / new_z - 1.0
+        z = new_z
+        bound = z
+        damping *= 0.4
+        for i in range(n):
+            for j in range(3):
+                u[i, j] = trial[i, j]
+        if z < best:
+            best = z
+            for i in range(n):
+                for j in range(3):
+                    dv[i, j] = arc[i, j]
+        if gain < _GAIN:
+            break
+    return best

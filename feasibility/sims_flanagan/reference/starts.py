@@ -1,0 +1,162 @@
+"""First guesses for the reference solver: sequences of impulses, one a segment.
+
+Impulses, not throttles, because a guess must not depend on the mass that is
+looked for. They are in `constants.EARTH_VELOCITY`, heliocentric frame.
+
+The maximum initial mass of a long leg has many local optima, one or more for
+each number of revolutions, and which one a start leads to depends on where it
+drifts to: hence the tangential starts in four sizes, the ones that turn round
+half-way, and the wandering ones.
+"""
+
+from collections.abc import Iterator
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.runtime.pykep_guard import load_pykep
+
+Start = tuple[int, NDArray[np.float64]]
+"""Index of the start and its (s, 3) impulses."""
+
+MAX_REVOLUTIONS: Final = 2
+"""Lambert branches are tried up to this number of complete revolutions."""
+
+N_LAMBERT: Final = 1 + 2 * MAX_REVOLUTIONS
+"""Indices 0 to N_LAMBERT - 1 are Lambert branches: 0 revolutions, low and high path of 1, of 2."""
+
+N_WANDERING: Final = 6
+"""Number of wandering starts that every leg gets."""
+
+_SIZES = (1.0, 8.0, 0.25, 3.0)
+_TURN_SIZES = (3.0, 1.0)
+_BASE_SIZE = 0.2
+
+FIRST_WANDERING: Final = N_LAMBERT + 2 * len(_SIZES) + 2 * len(_TURN_SIZES)
+"""Index of the first wandering start; between it and the Lambert branches the tangential ones."""
+
+N_HOPS: Final = 10
+"""Number of solves from the best solution, for legs whose starts do not agree."""
+
+FIRST_HOP: Final = FIRST_WANDERING + N_WANDERING
+"""Index of the first of these."""
+
+FROM_GUESS: Final = FIRST_HOP + N_HOPS
+"""Index of the start from a solution that the caller gives."""
+
+FIRST_RANDOM: Final = FROM_GUESS + 1
+"""Index of the first random start."""
+
+_KNOTS = 4
+
+
+def reference_starts(leg: Any, n_random: int, rng: np.random.Generator | None) -> Iterator[Start]:
+    """Yield the starts of one leg, those that win most often for their number first.
+
+    Parameters
+    ----------
+    leg : pykep.leg.sims_flanagan
+        The leg in scaled units (`pykep_leg.scaled_leg`).
+    n_random : int
+        Number of random starts after the fixed ones.
+    rng : numpy.random.Generator, optional
+        Source of the random starts; needed if `n_random` is not 0.
+
+    Yields
+    ------
+    Start
+        In order: the Lambert arc below one revolution; thrust along and against
+        the velocity; the Lambert arcs of 1 and 2 revolutions; thrust along and
+        against in other sizes, and turning round half-way; wandering directions;
+        random ones.
+    """
+    lambert = list(_lambert(leg))
+    tangential = list(_tangential(leg))
+    yield from (start for start in lambert if start[0] == 0)
+    yield from tangential[:2]
+    yield from (start for start in lambert if start[0] > 0)
+    yield from tangential[2:]
+    # The wandering starts are part of the method, the same for every leg and every call.
+    yield from _wandering(leg, N_WANDERING, np.random.default_rng(0), FIRST_WANDERING)
+    if rng is not None:
+        yield from _wandering(leg, n_random, rng, FIRST_RANDOM)
+
+
+def _lambert(leg: Any) -> Iterator[Start]:
+    """Yield the two impulses of every Lambert branch, each spread over its half of the leg."""
+    (r_dep, v_dep), (r_arr, v_arr) = leg.rvs, leg.rvf
+    arcs = load_pykep().lambert_problem(
+        r0=r_dep, r1=r_arr, tof=leg.tof, mu=leg.mu, cw=False, multi_revs=MAX_REVOLUTIONS
+    )
+    half = leg.nseg_fwd
+    for branch, (v0, v1) in enumerate(zip(arcs.v0, arcs.v1, strict=True)):
+        impulses = np.empty((leg.nseg, 3))
+        impulses[:half] = (np.array(v0) - v_dep) / half
+        impulses[half:] = (np.array(v_arr) - v1) / (leg.nseg - half)
+        # The transfer plane is not defined at 180 degrees.
+        if np.isfinite(impulses).all():
+            yield branch, impulses
+
+
+def _tangential(leg: Any) -> Iterator[Start]:
+    """Yield impulses along and against the velocity of the coasted departure orbit."""
+    pykep = load_pykep()
+    along = np.empty((leg.nseg, 3))
+    for segment in range(leg.nseg):
+        tof = leg.tof * (segment + 0.5) / leg.nseg
+        along[segment] = pykep.propagate_lagrangian(rv=leg.rvs, tof=tof, mu=leg.mu)[1]
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    turning = np.where(np.arange(leg.nseg) < leg.nseg_fwd, 1.0, -1.0)[:, None] * along
+    index = N_LAMBERT
+    for sizes, directions in ((_SIZES, along), (_TURN_SIZES, turning)):
+        for size in sizes:
+            for sign in (1.0, -1.0):
+                yield index, sign * size * _impulse(leg) * directions
+                index += 1
+
+
+def _wandering(
+    leg: Any, n_starts: int, rng: np.random.Generator, first_index: int
+) -> Iterator[Start]:
+    """Yield impulses whose direction wanders smoothly from knot to knot, in two sizes."""
+    for number in range(n_starts):
+        path = _smooth_path(leg.nseg, rng)
+        norms = np.maximum(np.linalg.norm(path, axis=1, keepdims=True), 1e-9)
+        size = 1.0 if number % 2 else 3.0
+        yield first_index + number, size * _impulse(leg) * path / norms
+
+
+def bends(n_segments: int, n: int) -> Iterator[NDArray[np.float64]]:
+    """Yield what is added to the throttles of a solution to leave its optimum.
+
+    Parameters
+    ----------
+    n_segments : int
+        Number of segments, s.
+    n : int
+        How many.
+
+    Yields
+    ------
+    (s, 3) float64
+        First zeros, for a solver that stopped early, then smooth disturbances of
+        the size of the throttles; the same for every leg.
+    """
+    rng = np.random.default_rng(0)
+    for number in range(n):
+        yield _smooth_path(n_segments, rng) if number else np.zeros((n_segments, 3))
+
+
+def _smooth_path(n_segments: int, rng: np.random.Generator) -> NDArray[np.float64]:
+    at = np.linspace(0.0, _KNOTS - 1.0, n_segments)
+    knots = rng.normal(size=(3, _KNOTS))
+    return np.stack([np.interp(at, np.arange(_KNOTS), axis) for axis in knots], axis=1)
+
+
+def _impulse(leg: Any) -> float:
+    """Return the impulse of one segment for starts that have no size of their own.
+
+    It only sets the mass at which the solver starts, and so how far it first drifts.
+    """
+    return float(np.linalg.norm(leg.rvs[1])) * _BASE_SIZE / float(leg.nseg)

@@ -1,0 +1,1 @@
+"""Expanders: from nodes to flyable hops."""

@@ -1,0 +1,1 @@
+"""Frontiers: which of the nodes that wait are expanded next."""

@@ -1,0 +1,94 @@
+"""`TimeSliceFrontier`: nodes compete with those that are equally far on in time."""
+
+from typing import final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seqsearch.beam.frontiers.selection import select
+from seqsearch.beam.rankings.protocol import Ranking
+from seqsearch.core.nodes import Nodes
+from seqsearch.core.problem import TourProblem
+from seqsearch.settings import SearchSettings
+
+_STARTS = -1
+"""Slice of the start nodes, which are expanded before all others."""
+
+
+@final
+class TimeSliceFrontier:
+    """Racing: nodes wait in slices of elapsed time, and the earliest slice is expanded first.
+
+    A beam by depth compares nodes with the same number of visits, one early and
+    another late. Here a node competes with those that arrived within the same
+    `slice_days` after their own start, whatever their number of visits (as in
+    the lazy race tree search of Izzo, Hennes, Simões and Märtens 2016, "Designing
+    complex interplanetary trajectories for the global trajectory optimization
+    competitions"). A visit more counts as the share that it has in a tour of
+    `nominal_visits`; the ranking says what has been used up for it.
+
+    Parameters
+    ----------
+    settings : SearchSettings
+        `slice_days`, `nominal_visits`, beam width (for each slice) and the caps of `select`.
+    problem : TourProblem
+        For the ranking.
+    ranking : Ranking
+        Scores what has been used up.
+    """
+
+    def __init__(self, settings: SearchSettings, problem: TourProblem, ranking: Ranking) -> None:
+        self._settings = settings
+        self._problem = problem
+        self._ranking = ranking
+        self._slices: dict[int, Nodes] = {}
+
+    def admit(self, nodes: Nodes, /, spare: float = 1.0) -> NDArray[np.intp]:
+        """Return the positions of the nodes that are among the best of their slice."""
+        admitted: list[NDArray[np.intp]] = []
+        for number, positions in self._by_slice(nodes):
+            rivals = nodes.take(positions)
+            waiting = self._slices.get(number)
+            if waiting is not None:
+                rivals = Nodes.concatenate([rivals, waiting])
+            chosen = self._best(rivals, spare)
+            admitted.append(positions[chosen[chosen < len(positions)]])
+        return np.concatenate(admitted) if admitted else np.zeros(0, dtype=np.intp)
+
+    def push(self, nodes: Nodes, /) -> None:
+        """Take in nodes, each into its slice."""
+        for number, positions in self._by_slice(nodes):
+            parts = [nodes.take(positions)]
+            if number in self._slices:
+                parts.insert(0, self._slices[number])
+            self._slices[number] = Nodes.concatenate(parts)
+
+    def pop(self) -> Nodes:
+        """Return the best nodes of the earliest slice; those beyond the beam width are dropped."""
+        if not self._slices:
+            empty = np.zeros(0)
+            return Nodes.at_start(empty.astype(np.intp), empty, empty)
+        number = min(self._slices)
+        nodes = self._slices.pop(number)
+        return nodes if number == _STARTS else nodes.take(self._best(nodes))
+
+    def waiting(self) -> Nodes | None:
+        """Return the nodes of all slices, earliest slice first."""
+        if not self._slices:
+            return None
+        return Nodes.concatenate([self._slices[number] for number in sorted(self._slices)])
+
+    def _best(self, nodes: Nodes, spare: float = 1.0) -> NDArray[np.intp]:
+        progress = nodes.depth / self._settings.nominal_visits
+        scores = self._ranking.score(nodes, self._problem) - progress * self._worth_of_a_tour()
+        return select(scores, nodes, self._settings, spare)
+
+    def _worth_of_a_tour(self) -> float:
+        """Return the score of a tour that used up everything."""
+        return self._settings.time_weight + self._settings.propellant_weight
+
+    def _by_slice(self, nodes: Nodes) -> list[tuple[int, NDArray[np.intp]]]:
+        elapsed = nodes.t_arr_mjd2000 - nodes.t_first_mjd2000
+        slices = np.floor(elapsed / self._settings.slice_days).astype(np.int64)
+        slices[nodes.depth == 0] = _STARTS
+        return [(int(number), np.flatnonzero(slices == number)) for number in np.unique(slices)]

@@ -1,0 +1,1 @@
+"""The command seqsearch: one file a sub-command."""

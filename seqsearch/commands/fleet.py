@@ -1,0 +1,110 @@
+"""What ``seqsearch run`` does for a fleet: one probe after another, each leaves its asteroids."""
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import msgspec
+
+from feasibility import InputError
+from seqsearch.commands.polish import polish_run
+from seqsearch.problems.problem_file import Config
+from seqsearch.runs.fleet import probe_folder, write_fleet
+from seqsearch.runs.run_folder import SEQUENCE
+from seqsearch.runs.session import Budget
+from seqsearch.tours.tour import Tour, read_tour
+
+SearchProbe = Callable[[Config, Path, int, Budget], int]
+"""Searches with a configuration into a folder with a seed and a budget; returns the exit code."""
+
+
+def run_fleet(
+    config: Config,
+    folder: Path,
+    *,
+    seed: int,
+    budget: Budget,
+    search_probe: SearchProbe,
+) -> int:
+    """Search and polish the probes of a fleet one after another and return the exit code.
+
+    Each probe is a run of its own in a sub-folder, whose configuration excludes
+    the asteroids of the probes before it; so each can be verified, resumed and
+    polished like any run. A time limit is shared: what a probe does not use is
+    for those after it.
+
+    Parameters
+    ----------
+    config : Config
+        With ``fleet.probes`` of 2 or more.
+    folder : Path
+        Is made; gets ``fleet.json`` and the sub-folders.
+    seed : int
+        Of the first probe; each next has the next.
+    budget : Budget
+        For the whole fleet; `max_solves` for each probe.
+    search_probe : callable
+        The search for one probe.
+
+    Raises
+    ------
+    InputError
+        The folder exists, or anything that a run of one probe may raise.
+    """
+    begin = time.monotonic()
+    try:
+        folder.mkdir(parents=True)
+    except FileExistsError:
+        raise InputError(
+            f"{folder}: exists; nothing is overwritten, choose another --out or remove it"
+        ) from None
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be created ({error.strerror})") from None
+    probes = config.fleet.probes
+    tours: list[Tour] = []
+    for number in range(1, probes + 1):
+        sub = folder / probe_folder(number)
+        single = _without(config, [body.id for tour in tours for body in tour.bodies])
+        share_s = None
+        if budget.time_limit_s is not None:
+            left_s = max(1.0, budget.time_limit_s - (time.monotonic() - begin))
+            share_s = left_s / (probes - number + 1)
+        probe_seed = seed + number - 1
+        print(f"probe {number} of {probes}", flush=True)
+        polish_share = config.fleet.polish_share
+        code = search_probe(
+            single,
+            sub,
+            probe_seed,
+            Budget(
+                time_limit_s=None if share_s is None else (1.0 - polish_share) * share_s,
+                max_solves=budget.max_solves,
+                workers=budget.workers,
+            ),
+        )
+        if code != 0:
+            return code
+        if polish_share > 0 and read_tour(sub / SEQUENCE).legs:
+            polish_run(
+                sub,
+                time_limit_s=None if share_s is None else polish_share * share_s,
+                seed=probe_seed,
+                workers=budget.workers,
+            )
+        tours.append(read_tour(sub / SEQUENCE))
+        write_fleet(folder, tours, probes, seed)
+    print()
+    for number, tour in enumerate(tours, 1):
+        print(f"probe {number}: {tour.summary()}")
+    total = sum(tour.n_asteroids for tour in tours)
+    print(f"{total} asteroids; check them with: seqsearch verify {folder}")
+    return 0
+
+
+def _without(config: Config, ids: list[int]) -> Config:
+    """Return the configuration of a single probe that leaves these asteroids to the others."""
+    catalogue = msgspec.structs.replace(
+        config.catalogue, exclude_ids=(*config.catalogue.exclude_ids, *ids)
+    )
+    fleet = msgspec.structs.replace(config.fleet, probes=1)
+    return msgspec.structs.replace(config, catalogue=catalogue, fleet=fleet)

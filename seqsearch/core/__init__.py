@@ -1,0 +1,1 @@
+"""The words of the search: problem, nodes, hops, candidates, tree and full optimisation."""

@@ -1,0 +1,142 @@
+"""`Problem`: everything that defines a tour, and nothing about how to find one."""
+
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility import InputError, Legs, Spacecraft
+from feasibility.constants import MJD2000_MJD
+from feasibility.orbits import Catalogue
+from seqsearch.core.nodes import Nodes
+from seqsearch.core.problem import Hops
+
+
+@final
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Problem:
+    """A multi-rendezvous problem: one spacecraft, many bodies, as many visits as possible.
+
+    With n the number of bodies of the catalogue. The clock runs from the first
+    departure to the last arrival.
+
+    Parameters
+    ----------
+    name : str
+        Name, for reports.
+    catalogue : Catalogue
+        The n bodies that may be visited.
+    spacecraft : Spacecraft
+        Dry mass, thrust and specific impulse.
+    m0 : float
+        Initial (wet) mass in kg at the first departure.
+    first_departure_mjd2000 : tuple of float
+        Earliest and latest epoch of the first departure.
+    max_duration_days : float
+        Longest time from the first departure to the last arrival.
+    min_stay_days : float
+        Shortest time between an arrival and the next departure.
+    start_ids : tuple of int, optional
+        Ids of the bodies at which a tour may start; empty for any.
+
+    Raises
+    ------
+    InputError
+        A value is not finite or out of range, the wet mass is below the dry
+        mass, the catalogue is empty, or a start id is not in it.
+    """
+
+    name: str
+    catalogue: Catalogue
+    spacecraft: Spacecraft
+    m0: float
+    first_departure_mjd2000: tuple[float, float]
+    max_duration_days: float
+    min_stay_days: float
+    start_ids: tuple[int, ...] = ()
+
+    def __post_init__(self) -> None:
+        numbers = {
+            "wet mass": self.m0,
+            "first departure (earliest)": self.first_departure_mjd2000[0],
+            "first departure (latest)": self.first_departure_mjd2000[1],
+            "max_duration_days": self.max_duration_days,
+            "min_stay_days": self.min_stay_days,
+        }
+        for label, value in numbers.items():
+            if not np.isfinite(value):
+                raise InputError(f"problem {self.name}: {label} is {value}, expected a number")
+        if self.m0 <= 0:
+            raise InputError(
+                f"problem {self.name}: wet mass {self.m0:g} kg, expected more than zero"
+            )
+        if self.m0 <= self.spacecraft.m_dry:
+            raise InputError(
+                f"problem {self.name}: dry mass {self.spacecraft.m_dry:g} kg is not below the "
+                f"wet mass {self.m0:g} kg"
+            )
+        earliest, latest = self.first_departure_mjd2000
+        if latest < earliest:
+            raise InputError(
+                f"problem {self.name}: first departure window ends ({latest + MJD2000_MJD:g} MJD) "
+                f"before it begins ({earliest + MJD2000_MJD:g} MJD)"
+            )
+        if self.max_duration_days <= 0:
+            raise InputError(
+                f"problem {self.name}: max_duration_days = {self.max_duration_days:g}, "
+                "expected more than zero"
+            )
+        if self.min_stay_days < 0:
+            raise InputError(
+                f"problem {self.name}: min_stay_days = {self.min_stay_days:g}, "
+                "expected zero or more"
+            )
+        if len(self.catalogue) < 2:
+            raise InputError(
+                f"problem {self.name}: the catalogue {self.catalogue.source} holds "
+                f"{len(self.catalogue)} bodies, expected at least two"
+            )
+        self.start_rows()
+
+    def start_rows(self) -> NDArray[np.intp]:
+        """Return the catalogue rows of the bodies at which a tour may start.
+
+        Raises
+        ------
+        InputError
+            A start id is not in the catalogue.
+        """
+        if not self.start_ids:
+            return np.arange(len(self.catalogue))
+        return np.asarray(self.catalogue.rows_of(np.asarray(self.start_ids)), dtype=np.intp)
+
+    def start_nodes(self, rows: NDArray[np.intp], t_mjd2000: NDArray[np.float64], /) -> Nodes:
+        """Return the (k,) nodes at bodies and epochs, with full tanks."""
+        return Nodes.at_start(rows, t_mjd2000, np.full(len(rows), self.m0))
+
+    def hops(
+        self,
+        nodes: Nodes,
+        parent: NDArray[np.intp],
+        target: NDArray[np.intp],
+        t_dep_mjd2000: NDArray[np.float64],
+        tof_days: NDArray[np.float64],
+        /,
+    ) -> Hops:
+        """Return the (k,) hops, each a single leg; see `TourProblem.hops`."""
+        catalogue, craft = self.catalogue, self.spacecraft
+        row = nodes.row[parent]
+        legs = Legs(
+            rv_dep=catalogue.states_at(row, t_dep_mjd2000),
+            rv_arr=catalogue.states_at(target, t_dep_mjd2000 + tof_days),
+            tof_days=tof_days,
+            m0=nodes.mass[parent],
+            thrust=craft.thrust,
+            isp=craft.isp,
+            m_dry=craft.m_dry,
+            t_dep_mjd2000=t_dep_mjd2000,
+            dep_id=catalogue.ids[row],
+            arr_id=catalogue.ids[target],
+        )
+        return Hops((legs,), (np.zeros(len(legs)),))

@@ -1,0 +1,1 @@
+"""Pruners by name, the pruning of hops, and the audit of what pruning costs."""

@@ -1,0 +1,163 @@
+"""The run folder: configuration, provenance, counters and the best tour so far."""
+
+import csv
+import hashlib
+import io
+import json
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Final, Self, final
+
+from feasibility import InputError
+from feasibility.runtime.atomic import write_text
+from feasibility.runtime.provenance import provenance
+from seqsearch.beam.counters import RankCounters
+from seqsearch.problems.problem_file import Config, to_toml
+from seqsearch.pruning.audit_estimate import AuditEstimate
+from seqsearch.tours.tour import Tour, read_tour, to_csv, to_json
+
+CONFIG: Final = "config.toml"
+"""Name of the file with everything that was set."""
+
+SEQUENCE: Final = "sequence.json"
+"""Name of the file with the best tour."""
+
+
+PROVENANCE: Final = "provenance.json"
+"""Name of the file that says where the run came from."""
+
+
+@final
+class RunFolder:
+    """Writes what a run produces; each file is complete or absent at any moment.
+
+    Use `create` or `open`. The files are ``config.toml`` (resolved),
+    ``provenance.json`` (seed, versions, git commit, command), ``counters.csv``,
+    ``audit.json``, ``sequence.json`` and ``sequence.csv``; the last four are
+    rewritten after each rank, so an interrupted run leaves its best tour.
+    """
+
+    def __init__(self, path: Path, legs: int = 0) -> None:
+        self.path = path
+        self._legs = legs
+
+    @classmethod
+    def create(cls, path: Path, config: Config, seed: int) -> Self:
+        """Make a new folder and write configuration and provenance.
+
+        Raises
+        ------
+        InputError
+            The folder exists or cannot be created; nothing is overwritten.
+        """
+        try:
+            path.mkdir(parents=True)
+        except FileExistsError:
+            raise InputError(
+                f"{path}: exists; nothing is overwritten, choose another --out or remove it"
+            ) from None
+        except OSError as error:
+            raise InputError(f"{path}: cannot be created ({error.strerror})") from None
+        folder = cls(path)
+        write_text(path / CONFIG, to_toml(config))
+        record = provenance() | {"seed": seed}
+        write_text(path / PROVENANCE, json.dumps(record, indent=1) + "\n")
+        return folder
+
+    @classmethod
+    def open(cls, path: Path) -> Self:
+        """Return the folder of a run that was begun before.
+
+        Raises
+        ------
+        InputError
+            Its best tour cannot be read.
+        """
+        sequence = path / SEQUENCE
+        return cls(path, len(read_tour(sequence).legs) if sequence.exists() else 0)
+
+    def config_digest(self) -> str:
+        """Return the SHA-256 of the configuration file.
+
+        Raises
+        ------
+        InputError
+            It cannot be read.
+        """
+        file = self.path / CONFIG
+        try:
+            return hashlib.sha256(file.read_bytes()).hexdigest()
+        except OSError as error:
+            raise InputError(f"{file}: cannot be read ({error.strerror})") from None
+
+    def note_session(self, time_limit_s: float | None, max_solves: int | None) -> None:
+        """Add to the provenance that the run goes on.
+
+        Raises
+        ------
+        InputError
+            The file cannot be read or written.
+        """
+        file = self.path / PROVENANCE
+        try:
+            record = json.loads(file.read_text(encoding="utf-8"))
+            sessions = record.setdefault("resumed", [])
+        except (OSError, ValueError, AttributeError) as error:
+            raise InputError(f"{file}: cannot be read ({error})") from None
+        sessions.append(provenance() | {"time_limit_s": time_limit_s, "max_solves": max_solves})
+        write_text(file, json.dumps(record, indent=1) + "\n")
+
+    def write(self, tour: Tour, counters: Sequence[RankCounters]) -> None:
+        """Write the best tour, the counters and the audit.
+
+        A tour with fewer legs than the one that is there does not replace
+        it: a resumed run repeats the rank that was cut short.
+
+        Raises
+        ------
+        InputError
+            A file cannot be written; the files written before are intact.
+        """
+        if len(tour.legs) >= self._legs:
+            write_text(self.path / SEQUENCE, to_json(tour))
+            write_text(self.path / "sequence.csv", to_csv(tour))
+            self._legs = len(tour.legs)
+        write_text(self.path / "audit.json", audit_json(counters))
+        write_text(self.path / "counters.csv", counters_csv(counters))
+
+
+def counters_csv(counters: Sequence[RankCounters]) -> str:
+    """Return the counters as CSV, one row a rank, one column for each pruner."""
+    pruners = list(dict.fromkeys(name for record in counters for name in record.pruned))
+    rows = []
+    for record in counters:
+        row = asdict(record)
+        pruned = row.pop("pruned")
+        audit = row.pop("audit")
+        row |= {f"pruned_{name}": pruned.get(name, 0) for name in pruners}
+        for side in ("pruned", "kept"):
+            strata = [] if audit is None else audit[side]
+            row[f"audited_{side}"] = sum(stratum["solved"] for stratum in strata)
+            row[f"audited_{side}_flyable"] = sum(stratum["flyable"] for stratum in strata)
+        row |= {key: round(value, 3) for key, value in row.items() if isinstance(value, float)}
+        rows.append(row)
+    text = io.StringIO()
+    if rows:
+        writer = csv.DictWriter(text, fieldnames=list(rows[0]), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+    return text.getvalue()
+
+
+def audit_json(counters: Sequence[RankCounters]) -> str:
+    """Return what the audits say together, and the strata of each."""
+    audited = [(record, record.audit) for record in counters if record.audit is not None]
+    estimate = asdict(AuditEstimate.of(audit for _, audit in audited))
+    ranks = [
+        {"pass": record.pass_number, "rank": record.rank} | asdict(audit)
+        for record, audit in audited
+    ]
+    # JSON knows no NaN: the rate where no flyable candidate was seen.
+    plain = {key: None if value != value else value for key, value in estimate.items()}
+    return json.dumps({"estimate": plain, "ranks": ranks}, indent=1, allow_nan=False) + "\n"

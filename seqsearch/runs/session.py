@@ -1,0 +1,180 @@
+"""A session of a run: searches from a state on, writes the run folder, reports on screen."""
+
+import os
+import sys
+from concurrent.futures import BrokenExecutor, Executor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import final
+
+import numpy as np
+
+from feasibility import AllOf, InputError, Pruner
+from feasibility.classifier.predictor import LegPredictor
+from feasibility.pruners import PrunerContractError
+from feasibility.runtime.workers import worker_pool
+from feasibility.sims_flanagan.fast.compilation import compile_kernels, sample_leg
+from seqsearch.beam.beam_search import SearchResult, search
+from seqsearch.beam.counters import RankCounters
+from seqsearch.beam.state import SearchState
+from seqsearch.core.problem import TourProblem
+from seqsearch.problems.problem_file import Config
+from seqsearch.pruning.audit_estimate import AuditEstimate
+from seqsearch.pruning.pruner_spec import predictor_of
+from seqsearch.runs.checkpoint import Checkpoints
+from seqsearch.runs.run_folder import RunFolder
+from seqsearch.tours.plots import plot_tour
+from seqsearch.tours.tour import Tour
+
+
+@final
+@dataclass(frozen=True, kw_only=True)
+class Budget:
+    """What a run may use, sessions before included, and how many processes work on it.
+
+    Parameters
+    ----------
+    time_limit_s : float, optional
+        Wall-clock time.
+    max_solves : int, optional
+        Full optimisations.
+    workers : int, optional
+        Processes; default: one a core.
+
+    Raises
+    ------
+    InputError
+        A number below one.
+    """
+
+    time_limit_s: float | None = None
+    max_solves: int | None = None
+    workers: int | None = None
+
+    def __post_init__(self) -> None:
+        for option, number in (("--workers", self.workers), ("--max-solves", self.max_solves)):
+            if number is not None and number < 1:
+                raise InputError(f"{option} {number}: expected one or more")
+
+
+def run_session(
+    folder: RunFolder,
+    checkpoints: Checkpoints,
+    state: SearchState,
+    *,
+    config: Config,
+    problem: TourProblem,
+    pruner: AllOf,
+    budget: Budget,
+) -> int:
+    """Search from a state to the end, or until a budget is used up, and return the exit code.
+
+    Returns
+    -------
+    int
+        0; 1 where the worker processes died again and again; 2 where the pruner
+        broke its contract. What was found until then is in the run folder.
+    """
+
+    def on_rank(state: SearchState) -> None:
+        # A rank that a budget cut short is repeated on resuming, so that the result is the same.
+        if not state.counters[-1].cut:
+            checkpoints.save(state)
+        tour = Tour.from_tree(problem, state.tree, state.best_node)
+        folder.write(tour, state.counters)
+        print(_rank_line(state.counters[-1], tour), flush=True)
+
+    workers = budget.workers or os.cpu_count() or 1
+    try:
+        with worker_pool(workers) as executor:
+            if config.search.solver == "fast":
+                _compile_side_by_side(executor, pruner)
+            result = search(
+                problem,
+                pruner=pruner,
+                audit_predictor=_audit_predictor(config, pruner),
+                settings=config.search,
+                rng=np.random.default_rng(checkpoints.origin.seed),
+                executor=executor,
+                threads=workers,
+                time_limit_s=budget.time_limit_s,
+                max_solves=budget.max_solves,
+                resume=state,
+                on_rank=on_rank,
+            )
+            mended = 0 if executor is None else executor.mended
+    except (PrunerContractError, BrokenExecutor) as error:
+        print(f"seqsearch: {error}", file=sys.stderr)
+        print(f"all ranks before are saved: {_go_on(folder.path)}", file=sys.stderr)
+        return 2 if isinstance(error, PrunerContractError) else 1
+    folder.write(result.tour, result.counters)
+    plot_tour(result.tour, folder.path / "tour.png")
+    _report(folder.path, result, mended)
+    return 0
+
+
+def _audit_predictor(config: Config, pruner: AllOf) -> LegPredictor | None:
+    """Return what sorts the audit's legs: the default model, where the pruner has none."""
+    if config.search.audit_per_rank == 0 or pruner.pruners == ():
+        return None
+    # Imported here: a search without audit and model shall not pay for the model's kernels.
+    from feasibility.classifier.classifier import FeasibilityClassifier
+
+    return predictor_of(pruner) or FeasibilityClassifier.load()
+
+
+def _report(path: Path, result: SearchResult, mended: int) -> None:
+    counters = result.counters
+    print()
+    print(result.tour.table())
+    print()
+    if counters and (barren := counters[-1].barren_pruner()):
+        print(f"no leg survived pruner {barren} at rank {counters[-1].rank}")
+    if mended:
+        print(f"worker processes were lost and replaced {mended} times")
+    audits = [record.audit for record in counters if record.audit is not None]
+    if audits:
+        print(AuditEstimate.of(audits).one_line())
+    optimised = sum(record.optimised for record in counters)
+    if optimised:
+        failed = 1.0 - sum(record.feasible for record in counters) / optimised
+        print(f"{optimised} legs optimised, {100 * failed:.1f} % of them could not be flown")
+    print(result.tour.one_line())
+    print(f"{result.tour.summary()}; search {result.stopped}")
+    if result.stopped != "complete":
+        print(_go_on(path))
+    print(f"check it with: seqsearch verify {path}")
+
+
+def _go_on(path: Path) -> str:
+    return f"go on with: seqsearch resume {path}"
+
+
+def _compile_side_by_side(executor: Executor | None, pruner: Pruner) -> None:
+    """Compile the solver's kernels in one worker while this process compiles the pruner's."""
+    # Imported here: it loads numba.
+    from feasibility.runtime.jit import rare_collections
+
+    solver = None if executor is None else executor.submit(compile_kernels)
+    with rare_collections():
+        pruner.keep(sample_leg())
+    if solver is None:
+        compile_kernels()
+    else:
+        solver.result()
+
+
+def _rank_line(counters: RankCounters, tour: Tour) -> str:
+    if counters.rank == 0:
+        return (
+            f"pass {counters.pass_number} scouts : {counters.nodes} nodes, "
+            f"{counters.proposed} proposed, {counters.kept} itineraries to optimise, "
+            f"{counters.seconds:.1f} s | best {tour.headline()}"
+        )
+    pruned = ", ".join(f"{name} {count}" for name, count in counters.pruned.items())
+    return (
+        f"pass {counters.pass_number} rank {counters.rank:>2}: {counters.nodes} nodes, "
+        f"{counters.proposed} proposed, pruned {pruned or 'none'}, "
+        f"{counters.optimised} optimised, {counters.feasible} feasible, {counters.kept} kept, "
+        f"{counters.seconds:.1f} s | best {tour.headline()}"
+    )

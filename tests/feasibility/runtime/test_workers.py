@@ -1,0 +1,74 @@
+"""The pool of workers: it mends itself, and gives up in the end."""
+
+import os
+import signal
+import time
+from concurrent.futures import CancelledError, wait
+from pathlib import Path
+
+import pytest
+
+from feasibility.runtime.workers import MendingPool, WorkersLostError, worker_pool
+
+
+@pytest.fixture
+def pool():
+    with worker_pool(2) as pool:
+        yield pool
+
+
+def _square(x):
+    return x * x
+
+
+def _die_once(marker, x):
+    if not Path(marker).exists():
+        Path(marker).touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return x
+
+
+def _die():
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def _fail():
+    raise ValueError("mine")
+
+
+def test_calls_survive_a_killed_worker(pool, tmp_path):
+    futures = [pool.submit(_square, x) for x in range(20)]
+    futures.append(pool.submit(_die_once, str(tmp_path / "died"), -1))
+    futures += [pool.submit(_square, x) for x in range(20)]
+    expected = [x * x for x in range(20)]
+    assert [future.result(60) for future in futures] == [*expected, -1, *expected]
+    assert pool.mended == 1
+
+
+def test_a_call_that_always_kills_its_worker_is_given_up(pool):
+    with pytest.raises(WorkersLostError, match="died 3 times"):
+        pool.submit(_die).result(60)
+    assert pool.submit(_square, 3).result(60) == 9
+
+
+def test_exceptions_of_the_call_pass_through(pool):
+    with pytest.raises(ValueError, match="mine"):
+        pool.submit(_fail).result(60)
+    assert pool.mended == 0
+
+
+def test_a_cancelled_call_is_not_begun(pool):
+    blockers = [pool.submit(time.sleep, 0.5) for _ in range(4)]
+    futures = [pool.submit(time.sleep, 60) for _ in range(4)]
+    assert all(future.cancel() for future in futures)
+    wait(blockers, timeout=60)
+    with pytest.raises(CancelledError):
+        futures[0].result(0)
+    assert pool.submit(_square, 2).result(60) == 4
+
+
+def test_after_its_end_the_pool_takes_no_calls():
+    pool = MendingPool(2)
+    pool.shutdown()
+    with pytest.raises(RuntimeError):
+        pool.submit(_square, 1)

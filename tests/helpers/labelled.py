@@ -1,0 +1,67 @@
+"""Labelled legs that several tests share: drawn as the paper does, labelled by a closed form."""
+
+import functools
+from pathlib import Path
+
+import numpy as np
+
+from feasibility.dataset import Dataset, read_protocol
+from feasibility.dataset.columns import ARRIVAL_STATE, COLUMNS, DEPARTURE_STATE
+from feasibility.dataset.samplers.impulsive import lowest_delta_v
+from feasibility.dataset.storage import shard_path, write_metadata, write_shard
+from feasibility.orbits import synthetic_main_belt
+from feasibility.orbits.mima import mima
+
+
+@functools.cache
+def labelled_dataset(legs: int = 1500, seed: int = 0, bodies: int = 40) -> Dataset:
+    """Return Table 1 legs among so few bodies that pairs recur; m* is half of MIMA's estimate.
+
+    Solving them takes a hundred times longer, and a test of learning needs no better label.
+    """
+    protocol = read_protocol("table1")
+    catalogue = synthetic_main_belt(bodies, np.random.default_rng(5))
+    rng = np.random.default_rng(seed)
+    draw = protocol.sampler.draw(legs, rng, catalogue, protocol.craft(), protocol.impulsive_grid)
+    flown = draw.legs
+    m_star = 2.0 * mima(
+        flown.rv_dep, flown.rv_arr, flown.tof_s, flown.thrust, flown.exhaust_velocity
+    )
+    log_margin = np.log(m_star / flown.m0)
+    columns = {
+        "dep_id": flown.dep_id,
+        "arr_id": flown.arr_id,
+        "t_dep_mjd2000": flown.t_dep_mjd2000,
+        "tof_days": flown.tof_days,
+        "m0_kg": flown.m0,
+        "thrust_n": flown.thrust,
+        "isp_s": flown.isp,
+        "m_dry_kg": flown.m_dry,
+        "dt_imp_days": draw.dt_imp_days,
+        "lambert_dv_m_s": lowest_delta_v(flown.rv_dep, flown.rv_arr, flown.tof_days, 2),
+        "m_star_kg": m_star,
+        "log_margin": log_margin,
+        "m_final_kg": np.full(legs, np.nan),
+        "status": np.where(log_margin >= 0, 0, 3),
+        "start": np.zeros(legs),
+        "seconds": np.zeros(legs),
+        "boundary_draw": np.zeros(legs),
+    }
+    for state, names in ((flown.rv_dep, DEPARTURE_STATE), (flown.rv_arr, ARRIVAL_STATE)):
+        columns |= {column.name: state[:, axis] for axis, column in enumerate(names)}
+    typed = {column.name: np.asarray(columns[column.name], column.dtype) for column in COLUMNS}
+    metadata = {
+        "legs": legs,
+        "seed": seed,
+        "protocol": protocol.to_dict() | {"legs_per_shard": legs},
+        "catalogue": {"bodies": bodies, "source": "synthetic main belt"},
+    }
+    return Dataset(typed, metadata)
+
+
+def write_dataset(dataset: Dataset, folder: Path) -> Path:
+    """Write a dataset as ``feasibility generate`` does."""
+    folder.mkdir()
+    write_metadata(folder, dataset.metadata)
+    write_shard(shard_path(folder, 0), dataset.columns)
+    return folder

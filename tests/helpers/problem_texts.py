@@ -1,0 +1,23 @@
+"""Problem files as text that several tests share."""
+
+GOOD = """
+[problem]
+name = "mine"
+[spacecraft]
+wet_mass_kg = 2000
+dry_mass_kg = 800
+thrust_n = 0.3
+isp_s = 3000
+[mission]
+first_departure_mjd = [59215, 60000]
+max_duration_days = 700
+min_stay_days = 30
+[catalogue]
+synthetic_bodies = 300
+"""
+
+QUICK = (
+    GOOD
+    + "\n[search]\nbeam_width = 3\nstarts = 6\nstart_epochs = 2\nneighbours = 20\n"
+    + ("tof_days_step = 40\nsolves_per_rank = 60\n")
+)
