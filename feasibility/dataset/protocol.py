@@ -13,6 +13,7 @@ from feasibility.dataset.samplers.random_pairs import RandomPairs
 from feasibility.dataset.samplers.search_candidates import SearchCandidates
 from feasibility.errors import InputError
 from feasibility.legs import Spacecraft
+from feasibility.runtime.toml_file import decode_toml, read_toml
 
 Sampler = RandomPairs | SearchCandidates | AnySpacecraft
 """The samplers; a TOML file chooses by ``kind`` in its table ``[sampler]``."""
@@ -144,58 +145,15 @@ def read_protocol(protocol: str) -> Protocol:
     """
     builtin = builtin_protocols()
     if protocol in builtin:
-        return _decode(builtin[protocol], f"built-in protocol {protocol}")
+        return decode_toml(builtin[protocol], Protocol, f"built-in protocol {protocol}")
     path = Path(protocol)
     if not path.exists():
         raise InputError(
             f"{protocol}: no such protocol or file; built-in protocols are {', '.join(builtin)}"
         )
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: cannot be read as a TOML file ({error})") from None
-    read = _decode(text, str(path))
+    read = read_toml(path, Protocol)
     file = read.catalogue.file
     if file is not None and not Path(file).is_absolute():
         # A path inside a file is meant relative to that file.
         return read.with_catalogue(str(path.parent / file))
     return read
-
-
-def _decode(text: str, label: str) -> Protocol:
-    try:
-        return msgspec.toml.decode(text, type=Protocol, strict=False)
-    except msgspec.ValidationError as error:
-        raise InputError(f"{label}: {_readable(str(error), text)}") from None
-    except msgspec.DecodeError as error:
-        raise InputError(f"{label}: not valid TOML ({error})") from None
-
-
-def _readable(message: str, toml: str) -> str:
-    """Rewrite msgspec's ``... - at `$.sampler` `` in the words of a TOML file."""
-    text, _, where = message.partition(" - at `$")
-    where = where.rstrip("`").lstrip(".")
-    if text.startswith("Object contains unknown field"):
-        key = text.split("`")[1]
-        known = ", ".join(_known_keys(where, toml))
-        place = f"in [{where}]" if where else "at top level"
-        return f"unknown key {key!r} {place}; known keys are {known}"
-    text = text[0].lower() + text[1:]
-    return f"{text} (at {where})" if where else text
-
-
-def _known_keys(where: str, toml: str) -> list[str]:
-    tables: dict[str, Any] = {
-        "": Protocol,
-        "spacecraft": SpacecraftTable,
-        "catalogue": CatalogueTable,
-        "impulsive_grid": ImpulsiveGrid,
-    }
-    keys = []
-    if where == "sampler":
-        kind = msgspec.toml.decode(toml)["sampler"]["kind"]
-        for sampler in (RandomPairs, SearchCandidates, AnySpacecraft):
-            if sampler.__struct_config__.tag == kind:
-                tables["sampler"] = sampler
-                keys.append("kind")
-    return keys + [field.name for field in msgspec.structs.fields(tables[where])]
