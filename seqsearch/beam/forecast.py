@@ -6,10 +6,9 @@ time, and one good answer at the curve's crossing of 1 corrects it. From there o
 times are free: the shortest that can be flown, and longer ones, which save propellant.
 """
 
-from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Final, TypeVar, final
+from typing import Final, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +16,7 @@ from numpy.typing import NDArray
 from feasibility import Legs
 from feasibility.classifier.predictor import LegPredictor, QuickPredictor, bounded_final_mass
 from feasibility.orbits import OrbitalNeighbours
+from feasibility.runtime.workers import in_threads
 from seqsearch.core.candidates import Candidates
 from seqsearch.core.margin_curves import MarginCurves, flight_times
 from seqsearch.core.nodes import Nodes
@@ -24,8 +24,6 @@ from seqsearch.core.problem import Hops, TourProblem
 from seqsearch.settings import SearchSettings
 
 _Array = NDArray[np.float64]
-_Item = TypeVar("_Item")
-_Answer = TypeVar("_Answer")
 
 _PAIRS_AT_ONCE: Final = 10_000
 """Pairs of node and target looked at by one thread at once: bounds memory."""
@@ -334,20 +332,3 @@ def log_margin(ask: Callable[[Legs], _Array], hops: Hops) -> _Array:
     answers = [np.log(ask(legs)) for legs in hops.stages]
     lowest: _Array = np.min(answers, axis=0)
     return lowest
-
-
-def in_threads(
-    work: Callable[[_Item], _Answer], items: Iterable[_Item], threads: int
-) -> Iterator[_Answer]:
-    """Yield what `work` makes of each item, in order, with few items under way at a time."""
-    if threads == 1:
-        yield from map(work, items)
-        return
-    with ThreadPoolExecutor(threads) as pool:
-        under_way = []
-        for item in items:
-            under_way.append(pool.submit(work, item))
-            if len(under_way) > 2 * threads:
-                yield under_way.pop(0).result()
-        for future in under_way:
-            yield future.result()

@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 
 from feasibility.classifier.predictor import LegPredictor
 from feasibility.orbits import OrbitalNeighbours, orbital_metric
-from seqsearch.beam.forecast import in_threads, log_margin, quick_margin_of
+from feasibility.runtime.workers import in_threads
+from seqsearch.beam.forecast import log_margin, quick_margin_of
 from seqsearch.core.problem import TourProblem
 from seqsearch.settings import SearchSettings
 
