@@ -1,7 +1,6 @@
 """The command ``feasibility assess``."""
 
 import argparse
-import json
 import tempfile
 from pathlib import Path
 from typing import Any, Final
@@ -69,7 +68,7 @@ def run(options: argparse.Namespace) -> int:
         Input that cannot be used.
     """
     from feasibility.classifier.classifier import FeasibilityClassifier
-    from feasibility.runtime.atomic import write_text
+    from feasibility.runtime.atomic import write_json
     from feasibility.runtime.provenance import provenance
     from feasibility.spacecraft.assess import assess
     from feasibility.spacecraft.legs import make, parts_of
@@ -96,7 +95,7 @@ def run(options: argparse.Namespace) -> int:
             **outcome.to_dict(),
             "provenance": provenance(),
         }
-        write_text(Path(options.out), json.dumps(record, indent=1) + "\n")
+        write_json(Path(options.out), record)
         print(f"wrote {options.out}")
     return 0
 

@@ -1,7 +1,6 @@
 """What ``feasibility generate`` does: check, make the missing shards, report."""
 
 import importlib
-import os
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -13,7 +12,7 @@ from typing import Any
 from feasibility.dataset.generate import Generation, begin
 from feasibility.dataset.protocol import read_protocol
 from feasibility.errors import InputError, MissingDependencyError
-from feasibility.runtime.workers import worker_pool
+from feasibility.runtime.workers import default_workers, worker_pool
 from feasibility.sims_flanagan.fast.compilation import compile_kernels
 
 
@@ -59,7 +58,7 @@ def run_generate(
         done += rows
 
     try:
-        with _executor(min(workers or os.cpu_count() or 1, len(generation.tasks)), scheduler) as (
+        with _executor(min(workers or default_workers(), len(generation.tasks)), scheduler) as (
             executor,
             in_flight,
         ):

@@ -1,13 +1,14 @@
 """The command ``feasibility retrain``."""
 
 import argparse
-import os
 import time
 from pathlib import Path
 from typing import Any, Final
 
 from feasibility.commands.assess import check_numbers
 from feasibility.errors import InputError
+from feasibility.runtime.folders import make_folder
+from feasibility.runtime.workers import default_workers
 
 _DESCRIPTION: Final = """\
 Make a model for your spacecraft from the default model. `feasibility assess`
@@ -100,12 +101,12 @@ def run(options: argparse.Namespace) -> int:
     # Asked for now rather than after minutes of solving.
     load_extra("torch")
     folder = out.with_name(out.name + ".retrain")
-    folder.mkdir(exist_ok=True)
+    make_folder(folder)
     settings = RetrainSettings(
         **{name: getattr(options, name) for name in counts},
         seed=options.seed,
         workers=options.workers,
-        threads=options.threads or os.cpu_count() or 1,
+        threads=options.threads or default_workers(),
         device=options.device,
     )
     began = time.perf_counter()

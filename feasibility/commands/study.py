@@ -1,13 +1,13 @@
 """The command ``feasibility study``."""
 
 import argparse
-import os
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from feasibility.errors import InputError
 from feasibility.learning.paper.models.precision import PRECISIONS
+from feasibility.runtime.workers import default_workers
 from feasibility.study import EXPERIMENTS
 from feasibility.study.presets import PRESETS, find_preset
 
@@ -112,7 +112,7 @@ def _run(options: argparse.Namespace) -> int:
 def _settings(options: argparse.Namespace, out: Path) -> "Settings":
     from feasibility.study.runner import Settings
 
-    cores = os.cpu_count() or 1
+    cores = default_workers()
     for name in ("workers", "threads"):
         value = getattr(options, name)
         if value is not None and value < 1:

@@ -1,6 +1,5 @@
 """How good a trained model is on a dataset: figures, tables and plots."""
 
-import json
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -15,7 +14,8 @@ from feasibility.dataset import Dataset
 from feasibility.evaluation.metrics import Confusion, reliability, roc_curve, summary
 from feasibility.evaluation.peers import Peer, PeerOutcome, ask, near_boundary
 from feasibility.learning.paper.train import labels
-from feasibility.runtime.atomic import atomic_path, write_text
+from feasibility.runtime.atomic import atomic_path, write_json, write_text
+from feasibility.runtime.folders import make_folder
 from feasibility.runtime.provenance import provenance
 
 RECALLS: Final = (0.9, 0.95, 0.99, 0.999)
@@ -118,12 +118,12 @@ class Evaluation:
         InputError
             The folder cannot be written to.
         """
-        folder.mkdir(parents=True, exist_ok=True)
+        make_folder(folder)
         paths = [
             folder / name for name in ("metrics.json", "metrics.md", "roc.png", "reliability.png")
         ]
         content = {"title": title, **self.to_dict(), "provenance": provenance()}
-        write_text(paths[0], json.dumps(content, indent=1) + "\n")
+        write_json(paths[0], content)
         write_text(paths[1], f"# {title}\n\n{self.table()}")
         self._plot_roc(paths[2], title)
         self._plot_reliability(paths[3], title)

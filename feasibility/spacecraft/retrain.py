@@ -1,7 +1,6 @@
 """A model for one spacecraft: legs of it, fine-tuning, and the proof that it is no worse."""
 
 import dataclasses
-import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -17,7 +16,7 @@ from feasibility.dataset.protocol import Protocol
 from feasibility.errors import InputError
 from feasibility.evaluation.evaluate import evaluate
 from feasibility.learning.margin.train import MarginEpoch, MarginRecipe, train_margin
-from feasibility.runtime.atomic import write_text
+from feasibility.runtime.atomic import write_json
 from feasibility.runtime.provenance import provenance
 from feasibility.spacecraft.legs import Part, make, parts_of
 from feasibility.spacecraft.spacecraft_file import LEGS_PER_SHARD, SpacecraftFile
@@ -222,7 +221,7 @@ def retrain(
         metrics={**chosen.metrics, "retrain": {"own": own[choice], "general": general[choice]}},
         provenance={**chosen.provenance, "retrain": report},
     )
-    write_text(folder / REPORT, json.dumps(report, indent=1) + "\n")
+    write_json(folder / REPORT, report)
     checkpoint.unlink(missing_ok=True)
     return Retrained(artefact, choice, own, general)
 

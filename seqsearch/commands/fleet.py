@@ -6,7 +6,7 @@ from pathlib import Path
 
 import msgspec
 
-from feasibility import InputError
+from feasibility.runtime.folders import new_folder
 from seqsearch.commands.polish import polish_run
 from seqsearch.problems.problem_file import Config
 from seqsearch.runs.fleet import probe_folder, write_fleet
@@ -52,14 +52,7 @@ def run_fleet(
         The folder exists, or anything that a run of one probe may raise.
     """
     begin = time.monotonic()
-    try:
-        folder.mkdir(parents=True)
-    except FileExistsError:
-        raise InputError(
-            f"{folder}: exists; nothing is overwritten, choose another --out or remove it"
-        ) from None
-    except OSError as error:
-        raise InputError(f"{folder}: cannot be created ({error.strerror})") from None
+    new_folder(folder)
     probes = config.fleet.probes
     tours: list[Tour] = []
     for number in range(1, probes + 1):

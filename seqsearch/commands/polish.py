@@ -1,7 +1,5 @@
 """What ``seqsearch polish`` does: read a run folder, polish its tours, write what is better."""
 
-import json
-import os
 from dataclasses import asdict
 from pathlib import Path
 from typing import Final
@@ -9,9 +7,9 @@ from typing import Final
 import numpy as np
 
 from feasibility import InputError
-from feasibility.runtime.atomic import write_text
+from feasibility.runtime.atomic import write_json, write_text
 from feasibility.runtime.provenance import provenance
-from feasibility.runtime.workers import worker_pool
+from feasibility.runtime.workers import default_workers, worker_pool
 from seqsearch.polish import PolishResult, PolishStep, distinct_tours, polish
 from seqsearch.problems.problem_file import build_problem, read_config
 from seqsearch.problems.rendezvous import Problem
@@ -87,7 +85,7 @@ def polish_run(
         if _better(tour, before):
             _replace(run, tour)
 
-    with worker_pool(workers or os.cpu_count() or 1) as executor:
+    with worker_pool(workers or default_workers()) as executor:
         result = polish(
             problem,
             tours,
@@ -151,4 +149,4 @@ def _report(
         "steps": [asdict(step) for step in result.steps],
         "provenance": provenance(),
     }
-    write_text(run / REPORT, json.dumps(record, indent=1) + "\n")
+    write_json(run / REPORT, record)

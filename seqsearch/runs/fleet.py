@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Final
 
 from feasibility import InputError
-from feasibility.runtime.atomic import write_text
+from feasibility.runtime.atomic import write_json
 from feasibility.runtime.provenance import provenance
 from seqsearch.runs.run_folder import SEQUENCE
 from seqsearch.tours.tour import Tour, read_tour
@@ -50,7 +50,7 @@ def write_fleet(folder: Path, tours: list[Tour], probes: int, seed: int) -> None
         "seed": seed,
         "provenance": provenance(),
     }
-    write_text(folder / FLEET, json.dumps(record, indent=1) + "\n")
+    write_json(folder / FLEET, record)
 
 
 def read_fleet(folder: Path) -> list[Tour]:

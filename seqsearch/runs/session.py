@@ -1,6 +1,5 @@
 """A session of a run: searches from a state on, writes the run folder, reports on screen."""
 
-import os
 import sys
 from concurrent.futures import BrokenExecutor, Executor
 from dataclasses import dataclass
@@ -12,7 +11,7 @@ import numpy as np
 from feasibility import AllOf, InputError, Pruner
 from feasibility.classifier.predictor import LegPredictor
 from feasibility.pruners import PrunerContractError
-from feasibility.runtime.workers import worker_pool
+from feasibility.runtime.workers import default_workers, worker_pool
 from feasibility.sims_flanagan.fast.compilation import compile_kernels, sample_leg
 from seqsearch.beam.beam_search import SearchResult, search
 from seqsearch.beam.counters import RankCounters
@@ -84,7 +83,7 @@ def run_session(
         folder.write(tour, state.counters)
         print(_rank_line(state.counters[-1], tour), flush=True)
 
-    workers = budget.workers or os.cpu_count() or 1
+    workers = budget.workers or default_workers()
     try:
         with worker_pool(workers) as executor:
             if config.search.solver == "fast":

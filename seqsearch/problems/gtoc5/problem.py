@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from feasibility import InputError, Spacecraft, optimise
 from feasibility.classifier.predictor import LegPredictor
 from feasibility.orbits import Catalogue, earth
+from feasibility.runtime.workers import in_threads
 from feasibility.sims_flanagan import solve_max_initial_mass
-from seqsearch.beam.forecast import in_threads
 from seqsearch.core.candidates import Candidates
 from seqsearch.core.custom_moves import Proposal
 from seqsearch.core.nodes import Nodes

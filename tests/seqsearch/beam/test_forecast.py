@@ -15,7 +15,7 @@ from feasibility.classifier.predictor import (
 )
 from feasibility.orbits import OrbitalNeighbours
 from seqsearch import search
-from seqsearch.beam.forecast import Forecast, Prospects, in_threads
+from seqsearch.beam.forecast import Forecast, Prospects
 from seqsearch.beam.starts import reachable_starts
 from seqsearch.core.margin_curves import MarginCurves, flight_times
 from tests.helpers.predictors import Toy
@@ -134,7 +134,6 @@ def test_answers_do_not_depend_on_threads(problem, neighbours):
         found.append(forecast.outlook(nodes, prospects, settings))
     assert np.array_equal(found[0][1], found[1][1])
     assert np.array_equal(found[0][0].hops.tof_days, found[1][0].hops.tof_days)
-    assert list(in_threads(lambda x: x * x, range(20), 3)) == [x * x for x in range(20)]
 
 
 def test_targets_of_which_nothing_is_known_are_proposed_on_the_grid(problem):
