@@ -35,7 +35,7 @@ from feasibility.sims_flanagan.fast.compilation import (
 from seqsearch.beam.beam_search import search
 from seqsearch.beam.state import SearchState
 from seqsearch.commands.cli import parse_duration
-from seqsearch.core.problem import TourProblem
+from seqsearch.core.problem import Problem
 from seqsearch.problems.problem_file import build_problem, read_config, with_catalogue
 from seqsearch.pruning.audit_estimate import AuditEstimate
 from seqsearch.pruning.pruner_spec import parse_pruner
@@ -67,7 +67,7 @@ class Row:
 
 
 def run(
-    problem: TourProblem, settings: SearchSettings, pruner: str, options: argparse.Namespace
+    problem: Problem, settings: SearchSettings, pruner: str, options: argparse.Namespace
 ) -> Row:
     steps: list[tuple[int, int]] = []
 

@@ -96,7 +96,7 @@ class Budget:
         return self._solves_used_up() or self.deadline.passed()
 
     def ending(self) -> str:
-        """Return ``"time limit"``, ``"solve limit"`` or, where neither is reached, ``"complete"``."""
+        """Return ``"time limit"`` or ``"solve limit"`` if it is reached, or ``"complete"``."""
         if self.deadline.passed():
             return "time limit"
         return "solve limit" if self._solves_used_up() else "complete"

@@ -152,9 +152,7 @@ def _run_rank(tools: Tools, beam: Beam, state: SearchState) -> None:
         pass_number=state.pass_number, rank=int(nodes.depth.max()) + 1, nodes=len(nodes)
     )
     sample = tools.auditor.sample(state)
-    affordable = settings.with_(
-        solves_per_rank=tools.budget.affordable(settings.solves_per_rank)
-    )
+    affordable = settings.with_(solves_per_rank=tools.budget.affordable(settings.solves_per_rank))
     found = beam.expander.expand(
         nodes, beam.frontier, affordable, counters, sample, tools.budget.deadline
     )
@@ -182,9 +180,7 @@ def _run_rank(tools: Tools, beam: Beam, state: SearchState) -> None:
         state.settings = rebalanced(state.settings, nodes, tools.problem)
 
 
-def _hung(
-    tools: Tools, found: FlownHops, rows: NDArray[np.intp], state: SearchState
-) -> Nodes:
+def _hung(tools: Tools, found: FlownHops, rows: NDArray[np.intp], state: SearchState) -> Nodes:
     """Hang the nodes that go on into the tree and return them with their ids."""
     kept = found.nodes.take(rows)
     legs = found.legs(tools.problem, rows)

@@ -267,6 +267,4 @@ class Forecast:
         )
 
     def _hops(self, nodes: Nodes, pairs: PairCurves, tof_days: _Array) -> Hops:
-        return self._problem.hops(
-            nodes, pairs.parent, pairs.target, pairs.t_dep_mjd2000, tof_days
-        )
+        return self._problem.hops(nodes, pairs.parent, pairs.target, pairs.t_dep_mjd2000, tof_days)

@@ -1,8 +1,9 @@
 """Pacing: how long passes take and how wide their beams are.
 
-Without a time limit the settings decide. Under one a first short pass gives an answer; each of the next takes three times as long, and
-the last one takes what is left. Within a pass the beam is as wide as can be afforded:
-the time left is divided by the ranks that are still to come and by what a node costs.
+Without a time limit the settings decide. Under one a first short pass gives an answer; each of
+the next takes three times as long, and the last one takes what is left. Within a pass the beam is
+as wide as can be afforded: the time left is divided by the ranks that are still to come and by
+what a node costs.
 """
 
 import time
@@ -111,7 +112,7 @@ class FixedPacing:
         """Return the settings as they are."""
         return settings
 
-    def scouting_s(self, settings: SearchSettings) -> None:  # noqa: ARG002
+    def scouting_s(self, settings: SearchSettings) -> None:
         """Return None: the number of generations is set."""
 
     def width(

@@ -59,7 +59,7 @@ class FlownHops:
         chains: list[tuple[FlownLeg, ...]] = [() for _ in range(len(rows))]
         if self.solved is None:
             return chains
-        flown, solved = (part.take(rows) for part in self.solved)
+        flown, solved = self.solved[0].take(rows), self.solved[1].take(rows)
         columns = zip(
             flown.hops.legs, flown.hops.dropped_kg, solved.m_star, solved.solutions, strict=True
         )

@@ -70,12 +70,11 @@ class Nodes(StructOfArrays):
         )
 
     @classmethod
-    def concatenate(cls, parts: "Sequence[Nodes]") -> Self:
+    def concatenate(cls, parts: "Sequence[Nodes]") -> "Nodes":
         """Return the nodes of all parts, at least one, in order."""
         width = max(part.visited.shape[1] for part in parts)
-        return super().concatenate(
-            [replace(part, visited=_padded(part.visited, width)) for part in parts]
-        )
+        wide = [replace(part, visited=_padded(part.visited, width)) for part in parts]
+        return super().concatenate(wide)
 
     def extended_visits(
         self, parent: NDArray[np.intp], target: NDArray[np.intp]

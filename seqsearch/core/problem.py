@@ -12,7 +12,7 @@ from seqsearch.core.hops import Hops
 from seqsearch.core.nodes import Nodes
 from seqsearch.core.tree import FlownLeg
 from seqsearch.settings import SearchSettings
-from seqsearch.tours.tour import Tour, TourRules
+from seqsearch.tours.tour import TourRules
 
 
 @runtime_checkable
@@ -148,8 +148,4 @@ class Problem(Protocol):
 
     def tour_rules(self) -> TourRules:
         """Return what a tour of this problem has to respect, as its file says it."""
-        ...
-
-    def score(self, tour: Tour, /) -> float:
-        """Return what the problem counts; larger is better."""
         ...

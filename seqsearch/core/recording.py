@@ -2,7 +2,6 @@
 
 from typing import Final
 
-import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -27,14 +26,16 @@ def record_tour(problem: Problem, tree: SearchTree, node: int) -> Tour:
     rows = [flown[0].dep_row if flown else int(last["row"])]
     rows += [leg.arr_row for leg in flown if leg.arr_row != leg.dep_row]
     flown += tree.closing(node)
-    tour = Tour(
-        rules=problem.tour_rules(),
+    rules = problem.tour_rules()
+    bodies = tuple(tour_body(problem.catalogue, row) for row in rows)
+    legs = tuple(_leg(problem, leg) for leg in flown)
+    return Tour(
+        rules=rules,
         t_start_mjd2000=flown[0].t_dep_mjd2000 if flown else float(last["t_mjd2000"]),
-        bodies=tuple(tour_body(problem.catalogue, row) for row in rows),
-        legs=tuple(_leg(problem, leg) for leg in flown),
-        score=0.0,
+        bodies=bodies,
+        legs=legs,
+        score=rules.score.score(bodies if rules.start_counts else bodies[1:], legs),
     )
-    return msgspec.structs.replace(tour, score=problem.score(tour))
 
 
 def tour_body(catalogue: Catalogue, row: int) -> TourBody:

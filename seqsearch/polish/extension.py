@@ -23,9 +23,9 @@ from feasibility.classifier.predictor import LegPredictor
 from feasibility.constants import DAY_S
 from feasibility.orbits import OrbitalNeighbours
 from feasibility.orbits.lambert import lambert
+from seqsearch.core.problem import Problem
 from seqsearch.polish.flight import Flight
 from seqsearch.polish.itinerary import Itinerary
-from seqsearch.problems.rendezvous import Problem
 
 _Array = NDArray[np.float64]
 _Index = NDArray[np.intp]

@@ -107,12 +107,12 @@ class NoSample:
 
     def solve(
         self,
-        problem: Problem,  # noqa: ARG002
-        nodes: Nodes,  # noqa: ARG002
-        optimiser: LegOptimiser,  # noqa: ARG002
-        solver: str,  # noqa: ARG002
-        deadline: Deadline,  # noqa: ARG002
-        contends: Callable[[Nodes], NDArray[np.bool_]],  # noqa: ARG002
+        problem: Problem,
+        nodes: Nodes,
+        optimiser: LegOptimiser,
+        solver: str,
+        deadline: Deadline,
+        contends: Callable[[Nodes], NDArray[np.bool_]],
     ) -> None:
         """Return None: nothing was audited."""
 

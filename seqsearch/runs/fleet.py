@@ -9,8 +9,9 @@ from feasibility import InputError
 from feasibility.runtime.atomic import write_json
 from feasibility.runtime.provenance import provenance
 from seqsearch.runs.run_folder import SEQUENCE
-from seqsearch.tours.tour import Tour, read_tour
-from seqsearch.tours.verify import Check
+from seqsearch.tours.checks import Check
+from seqsearch.tours.tour import Tour
+from seqsearch.tours.tour_files import read_tour
 
 FLEET: Final = "fleet.json"
 """Name of the file that makes a folder a fleet's."""

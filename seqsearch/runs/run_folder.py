@@ -16,7 +16,8 @@ from feasibility.runtime.provenance import provenance
 from seqsearch.beam.counters import RankCounters
 from seqsearch.problems.problem_file import Config, to_toml
 from seqsearch.pruning.audit_estimate import AuditEstimate
-from seqsearch.tours.tour import Tour, read_tour, to_csv, to_json
+from seqsearch.tours.tour import Tour
+from seqsearch.tours.tour_files import read_tour, to_csv, to_json
 
 CONFIG: Final = "config.toml"
 """Name of the file with everything that was set."""

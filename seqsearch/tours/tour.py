@@ -6,6 +6,8 @@ from feasibility.constants import G0, MJD2000_MJD, MU_SUN
 from feasibility.errors import InputError
 from seqsearch.tours.events.protocol import TourEvent
 from seqsearch.tours.records import Record, TourBody, TourLeg
+from seqsearch.tours.scores.protocol import ScoreRule
+from seqsearch.tours.scores.visits import VisitCount
 
 FORMAT: Final = "seqsearch-tour-2"
 """Name and version of the layout of ``sequence.json``."""
@@ -21,9 +23,8 @@ class TourRules(Record, frozen=True, kw_only=True):
         What is allowed beyond legs from rest to rest; nothing where it is empty.
     start_counts : bool
         Whether the body at which the tour starts counts as visited.
-    score_name, score_unit : str
-        What the score is called, and its unit; empty where it is the number of
-        visited bodies.
+    score : ScoreRule
+        What counts.
     """
 
     name: str
@@ -38,8 +39,7 @@ class TourRules(Record, frozen=True, kw_only=True):
     start_ids: tuple[int, ...]
     events: tuple[TourEvent, ...] = ()
     start_counts: bool = True
-    score_name: str = ""
-    score_unit: str = ""
+    score: ScoreRule = VisitCount()
     mu_m3_s2: float = MU_SUN
     g0_m_s2: float = G0
 
@@ -61,7 +61,7 @@ class Tour(Record, frozen=True, kw_only=True):
     legs : tuple of TourLeg
         One fewer than the bodies, and those that end with a fly-by.
     score : float
-        What the problem counts.
+        What the problem counts, by ``rules.score``.
     """
 
     format: str = FORMAT
@@ -74,7 +74,12 @@ class Tour(Record, frozen=True, kw_only=True):
     @property
     def n_asteroids(self) -> int:
         """Number of visited bodies."""
-        return len(self.bodies) - (0 if self.rules.start_counts else 1)
+        return len(self.visits)
+
+    @property
+    def visits(self) -> tuple[TourBody, ...]:
+        """The visited bodies in order; without the planet of a launch."""
+        return self.bodies if self.rules.start_counts else self.bodies[1:]
 
     @property
     def duration_days(self) -> float:
@@ -131,8 +136,7 @@ class Tour(Record, frozen=True, kw_only=True):
     def headline(self) -> str:
         """Return what counts in a few words."""
         visits = f"{self.n_asteroids} asteroids"
-        if not self.rules.score_name:
+        rule = self.rules.score
+        if not rule.name:
             return visits
-        return f"{self.rules.score_name} {self.score:.1f} {self.rules.score_unit}".rstrip() + (
-            f", {visits}"
-        )
+        return f"{rule.name} {self.score:.1f} {rule.unit}".rstrip() + f", {visits}"

@@ -13,6 +13,8 @@ from feasibility.constants import MJD2000_MJD
 from feasibility.errors import InputError
 from seqsearch.tours.events.make import make_event
 from seqsearch.tours.events.protocol import TourEvent
+from seqsearch.tours.scores.make import make_score
+from seqsearch.tours.scores.protocol import ScoreRule
 from seqsearch.tours.tour import FORMAT, Tour, TourRules
 
 FORMAT_1: Final = "seqsearch-tour-1"
@@ -63,9 +65,9 @@ def read_tour(path: Path) -> Tour:
         found = msgspec.json.decode(data, type=_Head).format
         if found == FORMAT_1:
             record = _upgraded(msgspec.json.decode(data))
-            return msgspec.convert(record, type=Tour, dec_hook=_event)
+            return msgspec.convert(record, type=Tour, dec_hook=_record)
         if found == FORMAT:
-            return msgspec.json.decode(data, type=Tour, dec_hook=_event)
+            return msgspec.json.decode(data, type=Tour, dec_hook=_record)
     except (msgspec.DecodeError, KeyError, TypeError, AttributeError) as error:
         raise InputError(f"{path}: not a complete {FORMAT} file ({error})") from None
     except InputError as error:
@@ -113,9 +115,11 @@ def to_csv(tour: Tour) -> str:
     return text.getvalue()
 
 
-def _event(kind: type, record: Any) -> Any:
+def _record(kind: type, record: Any) -> Any:
     if kind is TourEvent:
         return make_event(record)
+    if kind is ScoreRule:
+        return make_score(record)
     raise TypeError(f"a tour file has no {kind.__name__}")
 
 

@@ -34,6 +34,7 @@ VELOCITY_TOLERANCE_M_S: Final = 1.0
 
 _THROTTLE_TOLERANCE: Final = 1e-6
 _ELEMENT_TOLERANCE: Final = 1e-12
+_SCORE_TOLERANCE: Final = 1e-9
 
 
 class ElementTable(Protocol):
@@ -72,6 +73,7 @@ def verify_tour(tour: Tour, catalogue: ElementTable | None = None) -> Verificati
     for event in (*tour.rules.events, *absent):
         if event is not None:
             checks += event.checks(flown)
+    checks.append(_check_score(tour))
     if catalogue is not None:
         checks.append(_check_elements(tour, catalogue))
     return Verification(tuple(checks))
@@ -82,7 +84,9 @@ def _arrivals(tour: Tour) -> tuple[Arrival | None, ...]:
     mu = tour.rules.mu_m3_s2
     bodies = {body.id: body for body in tour.bodies}
     return tuple(
-        Arrival(fly(leg, bodies[leg.from_id], mu), body_state(bodies[leg.to_id], leg.t_arr_mjd2000, mu))
+        Arrival(
+            fly(leg, bodies[leg.from_id], mu), body_state(bodies[leg.to_id], leg.t_arr_mjd2000, mu)
+        )
         if leg.from_id in bodies and leg.to_id in bodies
         else None
         for leg in tour.legs
@@ -255,11 +259,21 @@ def _check_arrivals(flown: FlownTour) -> list[Check]:
     ]
 
 
+def _check_score(tour: Tour) -> Check:
+    rule = tour.rules.score
+    score = rule.score(tour.visits, tour.legs)
+    return Check(
+        "score",
+        abs(tour.score - score) <= _SCORE_TOLERANCE * max(1.0, abs(score)),
+        f"{tour.score:.6f}",
+        f"{score:.6f} {rule.unit}".rstrip(),
+    )
+
+
 def _check_elements(tour: Tour, table: ElementTable) -> Check:
     # The body of a launch is no asteroid: its event has the elements of the problem statement.
-    bodies = tour.bodies if tour.rules.start_counts else tour.bodies[1:]
     worst = 0.0
-    for body in bodies:
+    for body in tour.visits:
         row = int(table.rows_of([body.id])[0])
         angles = [body.i_rad, body.node_rad, body.argp_rad, body.mean_anomaly_rad]
         ours = np.array([body.a_m / AU, body.e, *angles, body.epoch_mjd2000])

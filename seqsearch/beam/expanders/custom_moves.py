@@ -34,9 +34,7 @@ class CustomMovesExpander:
         Predicts margins and masses for the problem.
     """
 
-    def __init__(
-        self, tools: ExpanderTools, moves: CustomMoves, predictor: LegPredictor
-    ) -> None:
+    def __init__(self, tools: ExpanderTools, moves: CustomMoves, predictor: LegPredictor) -> None:
         self._tools = tools
         self._moves = moves
         self._predictor = predictor
@@ -83,9 +81,7 @@ class CustomMovesExpander:
         """Return candidates and the nodes to which they seem to lead, in parts."""
         parts = []
         clock = time.perf_counter()
-        for part in self._moves.candidates(
-            nodes, settings, self._predictor, self._tools.threads
-        ):
+        for part in self._moves.candidates(nodes, settings, self._predictor, self._tools.threads):
             candidates = Candidates(part.parent, part.target, part.hops)
             counters.proposed += len(candidates)
             counters.questions += part.questions

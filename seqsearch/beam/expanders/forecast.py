@@ -1,4 +1,4 @@
-"""`ForecastExpander`: a predictor finds flight times and masses, and the best hops are optimised."""
+"""`ForecastExpander`: a predictor finds flight times and masses, the best hops are optimised."""
 
 import time
 from typing import Final, final

@@ -9,9 +9,7 @@ from seqsearch.beam.expanders.protocol import Expander, ExpanderTools
 from seqsearch.beam.scouting.guide import Guide
 
 
-def make_expander(
-    tools: ExpanderTools, predictor: LegPredictor | None, guide: Guide
-) -> Expander:
+def make_expander(tools: ExpanderTools, predictor: LegPredictor | None, guide: Guide) -> Expander:
     """Return an expander.
 
     Parameters

@@ -11,13 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility import Legs
-from feasibility.classifier.predictor import LegPredictor, QuickPredictor
+from feasibility.classifier.predictor import LegPredictor
+from seqsearch.core.hop_margins import quick_margin_of
 from seqsearch.core.margin_curves import MarginCurves, flight_times
 from seqsearch.problems.gtoc5.directions import even_directions
 from seqsearch.problems.gtoc5.lambert_departure import lambert_departure
 from seqsearch.problems.gtoc5.leg_maker import LegMaker
 from seqsearch.problems.gtoc5.self_fly_by import shortest_self_fly_by_days
-from seqsearch.problems.gtoc5.visits import Visits
+from seqsearch.problems.gtoc5.transfer_plans import TransferPlans
 from seqsearch.settings import SearchSettings
 
 _Array = NDArray[np.float64]
@@ -85,15 +86,13 @@ class Gtoc5Forecast:
     ) -> None:
         self._maker = maker
         self._predictor = predictor
-        self._quick = (
-            predictor.quick_margin if isinstance(predictor, QuickPredictor) else predictor.margin
-        )
+        self._quick = quick_margin_of(predictor)
         self._settings = settings
         self.questions = 0
         self._points = points
         self._directions = even_directions(_DIRECTIONS)
 
-    def launches(self, row: int, t: float, mass: float) -> Visits | None:
+    def launches(self, row: int, t: float, mass: float) -> TransferPlans | None:
         """Return ways from the Earth to first asteroids, launched along Lambert's arc.
 
         Parameters
@@ -118,14 +117,14 @@ class Gtoc5Forecast:
             return None
         pair, tof = found
         rows = target[best[pair]]
-        return Visits(
+        return TransferPlans(
             target=rows,
             fly_by_days=np.zeros(len(rows)),
             velocity=self._launch_velocity(row, t, rows, tof),
             tof_days=tof,
         )
 
-    def hops(self, row: int, t: float, mass: float, visited: _Rows) -> Visits | None:
+    def hops(self, row: int, t: float, mass: float, visited: _Rows) -> TransferPlans | None:
         """Return ways from rest at an asteroid, past it in a fly-by, to rest at others.
 
         Parameters
@@ -176,7 +175,7 @@ class Gtoc5Forecast:
             return None
         k, tof = found
         chosen = way[k]
-        return Visits(
+        return TransferPlans(
             target=target[pair[chosen]],
             fly_by_days=wait[course[chosen]],
             velocity=velocity[course[chosen]],

@@ -7,7 +7,8 @@ import pytest
 
 from seqsearch import search
 from seqsearch.beam.counters import RankCounters
-from seqsearch.beam.passes import Pacer, rebalanced
+from seqsearch.beam.pacing import ClockPacing
+from seqsearch.beam.rankings.rebalance import rebalanced
 from seqsearch.deadline import Deadline
 from tests.helpers.problems import small_problem, small_settings
 

@@ -13,7 +13,7 @@ from seqsearch import search
 from seqsearch.beam.frontiers.time_slices import TimeSliceFrontier
 from seqsearch.beam.rankings import BalancedRanking, ParetoRanking, PotentialRanking, make_ranking
 from seqsearch.beam.rankings.pareto import pareto_fronts
-from seqsearch.beam.rankings.protocol import TimePropellantRanking
+from seqsearch.beam.rankings.time_propellant import TimePropellantRanking
 from seqsearch.core.nodes import Nodes
 from seqsearch.settings import SearchSettings
 from tests.helpers.problems import small_problem

@@ -13,7 +13,7 @@ from feasibility.orbits import OrbitalNeighbours
 from seqsearch import search
 from seqsearch.beam.counters import RankCounters
 from seqsearch.beam.forecast import Forecast
-from seqsearch.beam.rankings.protocol import TimePropellantRanking
+from seqsearch.beam.rankings.time_propellant import TimePropellantRanking
 from seqsearch.beam.scouting.guide import Guide, starts_of
 from seqsearch.beam.scouting.pool import Pool
 from seqsearch.beam.scouting.regions import starts_near, window_part

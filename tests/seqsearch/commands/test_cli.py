@@ -11,7 +11,7 @@ import tomllib
 import pytest
 
 from seqsearch.commands.cli import main, parse_duration
-from seqsearch.problems.problem_file import builtin_problems
+from seqsearch.problems.registry import builtin_problems
 from tests.helpers.problem_texts import QUICK
 
 

@@ -10,7 +10,7 @@ from seqsearch.beam.expanders.forecast import keep_hops
 from seqsearch.beam.starts import dense_starts
 from seqsearch.core.candidates import expand, reached
 from seqsearch.core.nodes import Nodes
-from seqsearch.core.problem import Hops
+from seqsearch.core.hops import Hops
 from tests.helpers.labelled import labelled_dataset
 from tests.helpers.problems import small_problem, small_settings
 
@@ -49,7 +49,7 @@ def test_candidates_are_neighbours_times_delays_times_flight_times(problem, neig
     blocks = list(expand(problem, nodes, neighbours, settings))
     assert sum(map(len, blocks)) == 2 * settings.neighbours * 2 * len(settings.tof_days())
     for block in blocks:
-        (legs,) = block.hops.stages
+        (legs,) = block.hops.legs
         delay = legs.t_dep_mjd2000 - nodes.t_ready_mjd2000[block.parent]
         assert set(delay) == {0.0, 20.0}
         assert np.array_equal(legs.m0, nodes.mass[block.parent])
@@ -93,7 +93,7 @@ def test_reached_nodes_carry_the_clock_of_the_tour(problem, neighbours):
     nodes = _nodes(problem, [[5]], [t], [t])
     settings = small_settings(departure_delays_days=(10.0,))
     (block,) = expand(problem, nodes, neighbours, settings)
-    child = reached(problem, nodes, block, block.hops.stages[0].m0 - 50.0)
+    child = reached(problem, nodes, block, block.hops.legs[0].m0 - 50.0)
     assert np.all(child.depth == 1)
     assert np.all(child.t_first_mjd2000 == t + 10.0)
     assert np.allclose(child.t_ready_mjd2000 - child.t_arr_mjd2000, problem.min_stay_days)

@@ -6,7 +6,8 @@ import pytest
 from feasibility import Legs
 from seqsearch.core.nodes import Nodes
 from seqsearch.core.optimisation import solve_hops
-from seqsearch.core.problem import Hops, TourProblem
+from seqsearch.core.hops import Hops
+from seqsearch.core.problem import Problem
 from tests.helpers.problems import small_problem
 
 
@@ -48,7 +49,7 @@ def test_visits_of_different_depth_live_together():
 
 
 def test_the_rendezvous_problem_is_a_tour_problem(problem):
-    assert isinstance(problem, TourProblem)
+    assert isinstance(problem, Problem)
 
 
 def test_stages_of_a_hop_are_solved_with_the_mass_that_is_left(problem):

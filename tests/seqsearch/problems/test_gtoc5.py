@@ -13,10 +13,10 @@ from feasibility.orbits.lambert import lambert
 from feasibility.sims_flanagan import solve_max_initial_mass
 from seqsearch import Problem, SearchSettings, search, verify_tour
 from seqsearch.commands.cli import main
-from seqsearch.core.custom_moves import OwnMoves
+from seqsearch.core.custom_moves import CustomMoves
 from seqsearch.core.nodes import Nodes
 from seqsearch.core.optimisation import solve_hops
-from seqsearch.core.problem import TourProblem
+from seqsearch.core.problem import Problem
 from seqsearch.problems.gtoc5.directions import even_directions
 from seqsearch.problems.gtoc5.element_distance import phase_free_points
 from seqsearch.problems.gtoc5.forecast import FLY_BY_STRETCH, Gtoc5Forecast
@@ -26,7 +26,7 @@ from seqsearch.problems.gtoc5.rules import Gtoc5Rules
 from seqsearch.problems.gtoc5.self_fly_by import self_fly_by_delta_v, shortest_self_fly_by_days
 from seqsearch.problems.problem_file import build_problem, read_config, to_toml, with_catalogue
 from seqsearch.settings import SearchSettings as Settings
-from seqsearch.tours.tour import read_tour, to_csv, to_json
+from seqsearch.tours.tour_files import read_tour, to_csv, to_json
 
 GTOC5_TABLE = "gtoc/official/GTOC5-DATA.txt"
 
@@ -176,8 +176,8 @@ def test_lambert_departures_keep_to_the_range_of_speeds_along_an_arc():
 
 def test_the_problem_is_a_tour_problem_with_moves_of_its_own():
     problem = toy_problem()
-    assert isinstance(problem, TourProblem)
-    assert isinstance(problem, OwnMoves)
+    assert isinstance(problem, Problem)
+    assert isinstance(problem, CustomMoves)
     assert problem.catalogue.ids[problem.start_rows()].tolist() == [0]
 
 
@@ -199,7 +199,7 @@ def test_proposed_hops_are_chains_that_the_solver_flies(classifier):
     nodes = _node_at(problem, 5, 900.0)
     (proposal,) = problem.moves(nodes, settings, classifier, 2)
     hops = proposal.candidates.hops
-    fly_by, transfer = hops.stages
+    fly_by, transfer = hops.legs
     assert proposal.questions > len(hops)
     assert 5 not in proposal.candidates.target
     assert 0 not in proposal.candidates.target
@@ -240,12 +240,12 @@ def test_plain_hops_have_lambert_fly_bys_and_launches():
     target, t, tof = np.array([8, 9]), np.full(2, 8000.0), np.full(2, 250.0)
     parent = np.zeros(2, dtype=np.intp)
     hops = problem.hops(_node_at(problem, 5, 900.0), parent, target, t, tof)
-    assert len(hops.stages) == 2
+    assert len(hops.legs) == 2
     assert np.allclose(hops.tof_days, tof)
     launch = problem.hops(problem.start_nodes(np.array([0]), t[:1]), parent, target, t, tof)
-    assert len(launch.stages) == 1
+    assert len(launch.legs) == 1
     assert launch.dropped_kg[0].tolist() == [40.0, 40.0]
-    excess = launch.stages[0].rv_dep - problem.catalogue.states_at(parent, t)
+    excess = launch.legs[0].rv_dep - problem.catalogue.states_at(parent, t)
     assert (np.linalg.norm(excess, axis=1) <= 5000.0 + 1e-6).all()
 
 

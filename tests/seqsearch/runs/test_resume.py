@@ -251,7 +251,7 @@ def test_a_bad_pruner_is_named_by_search(pruner, what, expectation, wrapped):
 
 
 def _run_with(monkeypatch, pruner, problem_file, out):
-    monkeypatch.setattr("seqsearch.commands.run.parse_pruner", lambda spec: AllOf(pruner))
+    monkeypatch.setattr("seqsearch.runs.begin.parse_pruner", lambda spec: AllOf(pruner))
     arguments = ["run", str(problem_file), "--seed", "3", "--workers", "1", "--out", str(out)]
     return main(arguments)
 
