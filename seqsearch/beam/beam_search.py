@@ -118,7 +118,7 @@ def search(
         stopped = tools.budget.ending()
     except KeyboardInterrupt:
         stopped = "interrupted"
-    tour = record_tour(problem, state.tree, state.best_node)
+    tour = record_tour(problem, state.tree, state.best_node, state.closing)
     return SearchResult(tour, state.tree, state.counters, stopped)
 
 

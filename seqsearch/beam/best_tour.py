@@ -38,8 +38,6 @@ class BestTour:
         key = (int(deepest.depth[0]), -float(costs[best]))
         if key > state.best_key:
             node = int(deepest.tree_id[best])
+            end = state.tree.node(node)
             state.best_key, state.best_node = key, node
-            ended = state.tree.node(node)
-            state.tree.close(
-                node, self._problem.closing(ended["row"], ended["t_mjd2000"], ended["mass"])
-            )
+            state.closing = self._problem.closing(end["row"], end["t_mjd2000"], end["mass"])

@@ -16,16 +16,18 @@ _REST_M_S: Final = 1e-6
 """Relative speed below which a spacecraft is at rest at a body."""
 
 
-def record_tour(problem: Problem, tree: SearchTree, node: int) -> Tour:
-    """Return the tour that leads to a node of the search tree, with what completes it.
+def record_tour(
+    problem: Problem, tree: SearchTree, node: int, closing: tuple[FlownLeg, ...] = ()
+) -> Tour:
+    """Return the tour that leads to a node of the search tree, and on along closing legs.
 
-    Nothing is solved here: the legs after the last visit are those that the tree has.
+    Nothing is solved here.
     """
     flown = tree.legs_to(node)
     last = tree.node(node)
     rows = [flown[0].dep_row if flown else int(last["row"])]
     rows += [leg.arr_row for leg in flown if leg.arr_row != leg.dep_row]
-    flown += tree.closing(node)
+    flown += closing
     rules = problem.tour_rules()
     bodies = tuple(tour_body(problem.catalogue, row) for row in rows)
     legs = tuple(_leg(problem, leg) for leg in flown)

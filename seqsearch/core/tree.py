@@ -56,8 +56,7 @@ class SearchTree:
 
     `graph` is a `networkx.DiGraph` whose nodes carry ``row``, ``rank``,
     ``t_mjd2000`` (arrival, or start) and ``mass``, and whose edges carry
-    ``legs``, a tuple of `FlownLeg`. A node that ended the best tour so far also
-    carries ``closing``, the legs that complete the tour after it.
+    ``legs``, a tuple of `FlownLeg`.
     """
 
     def __init__(self) -> None:
@@ -82,15 +81,6 @@ class SearchTree:
         node = len(self)
         self.graph.add_node(node, row=row, rank=rank, t_mjd2000=t_mjd2000, mass=mass)
         return node
-
-    def close(self, node: int, legs: tuple[FlownLeg, ...]) -> None:
-        """Note the legs that complete a tour after a node."""
-        self.graph.nodes[node]["closing"] = legs
-
-    def closing(self, node: int) -> tuple[FlownLeg, ...]:
-        """Return the legs that complete a tour after a node, as far as they were noted."""
-        legs: tuple[FlownLeg, ...] = self.graph.nodes[node].get("closing", ())
-        return legs
 
     def rank(self, node: int) -> int:
         """Return the number of hops that lead to a node."""

@@ -157,7 +157,7 @@ class Checkpoints:
             rng_state=json.dumps(state.rng_state, default=_plain),
             best_node=state.best_node,
             best_key=state.best_key,
-            closing=state.tree.closing(state.best_node) if state.best_node >= 0 else (),
+            closing=state.closing,
             spent_s=state.spent_s,
             solves=state.solves,
         )
@@ -256,8 +256,7 @@ def _apply(rank: _Rank, state: SearchState, file: Path) -> None:
     state.rng_state = json.loads(rank.rng_state)
     state.best_node = rank.best_node
     state.best_key = rank.best_key
-    if rank.best_node >= 0:
-        state.tree.close(rank.best_node, rank.closing)
+    state.closing = rank.closing
     state.spent_s = rank.spent_s
     state.solves = rank.solves
 

@@ -50,7 +50,7 @@ def run_session(
         # A rank that a budget cut short is repeated on resuming, so that the result is the same.
         if not state.counters[-1].cut:
             checkpoints.save(state)
-        tour = record_tour(problem, state.tree, state.best_node)
+        tour = record_tour(problem, state.tree, state.best_node, state.closing)
         folder.write(tour, state.counters)
         print(_rank_line(state.counters[-1], tour), flush=True)
 

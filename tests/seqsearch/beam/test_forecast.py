@@ -88,8 +88,8 @@ def test_proposed_times_are_the_shortest_that_can_be_flown(problem, neighbours):
     forecast = Forecast(problem, predictor, neighbours)
     settings = small_settings(neighbours=20, flight_time_stretches=(1.0, 1.2))
     nodes = _nodes(problem)
-    prospects = PairCurves.concatenate([s.prospects for s in forecast.surveys(nodes, settings)])
-    sharp = forecast.sharpened(nodes, prospects, settings)
+    pairs = PairCurves.concatenate([s.pairs for s in forecast.surveys(nodes, settings)])
+    sharp = forecast.sharpened(nodes, pairs, settings)
     candidates, _, pair = forecast.outlook(nodes, sharp, settings)
     shortest = np.flatnonzero(np.diff(np.concatenate([[-1], pair])) != 0)
     assert 5 < len(shortest) < 60
@@ -130,8 +130,8 @@ def test_answers_do_not_depend_on_threads(problem, neighbours):
     found = []
     for threads in (1, 3):
         forecast = Forecast(problem, Toy(), neighbours, threads)
-        prospects = PairCurves.concatenate([s.prospects for s in forecast.surveys(nodes, settings)])
-        found.append(forecast.outlook(nodes, prospects, settings))
+        pairs = PairCurves.concatenate([s.pairs for s in forecast.surveys(nodes, settings)])
+        found.append(forecast.outlook(nodes, pairs, settings))
     assert np.array_equal(found[0][1], found[1][1])
     assert np.array_equal(found[0][0].hops.tof_days, found[1][0].hops.tof_days)
 

@@ -12,8 +12,8 @@ from scipy.stats import binomtest
 
 from feasibility import Legs
 from seqsearch.core.candidates import Candidates
-from seqsearch.core.nodes import Nodes
 from seqsearch.core.hops import Hops
+from seqsearch.core.nodes import Nodes
 from seqsearch.deadline import Deadline
 from seqsearch.pruning.audit import RankSample
 from seqsearch.pruning.audit_estimate import AuditEstimate, RankAudit, Stratum, share_interval
