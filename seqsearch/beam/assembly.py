@@ -12,9 +12,9 @@ from feasibility.orbits import OrbitalNeighbours
 from seqsearch.beam.auditing import Auditor, make_auditor
 from seqsearch.beam.best_tour import BestTour
 from seqsearch.beam.expanders.make import make_expander
-from seqsearch.beam.expanders.protocol import Expander, ExpanderTools
+from seqsearch.beam.expanders.protocol import Expander, ExpanderTools, MakeExpander
 from seqsearch.beam.frontiers.make import make_frontier
-from seqsearch.beam.frontiers.protocol import Frontier
+from seqsearch.beam.frontiers.protocol import Frontier, MakeFrontier
 from seqsearch.beam.pacing import ClockPacing, FixedPacing, Pacing
 from seqsearch.beam.passes import Passes
 from seqsearch.beam.rankings.make import make_ranking
@@ -53,6 +53,31 @@ class Beam:
 
 @final
 @dataclass(frozen=True, eq=False)
+class OwnParts:
+    """Parts that the caller of a search brings in place of those that the settings name.
+
+    Attributes
+    ----------
+    ranking : Ranking or None
+        Which nodes go on.
+    frontier : callable or None
+        Makes the frontier of each pass.
+    expander : callable or None
+        Makes the expander of each pass.
+    """
+
+    ranking: Ranking | None = None
+    frontier: MakeFrontier | None = None
+    expander: MakeExpander | None = None
+
+    @property
+    def none(self) -> bool:
+        """Whether there are none."""
+        return self.ranking is None and self.frontier is None and self.expander is None
+
+
+@final
+@dataclass(frozen=True, eq=False)
 class Tools:
     """What a search works with.
 
@@ -87,7 +112,7 @@ class Tools:
     _neighbours: OrbitalNeighbours
     _pruner: AllOf
     _predictor: LegPredictor | None
-    _ranking: Ranking | None
+    _own: OwnParts
     _threads: int
 
     def beam(self, state: SearchState) -> Beam:
@@ -100,7 +125,7 @@ class Tools:
         """
         guide = guide_to(state.guide)
         settings = guide.settings(state.settings)
-        ranking = self._ranking or make_ranking(settings, self._predictor, self._neighbours)
+        ranking = self._own.ranking or make_ranking(settings, self._predictor, self._neighbours)
         tools = ExpanderTools(
             self.problem,
             self._neighbours,
@@ -109,8 +134,12 @@ class Tools:
             self.optimiser,
             self._threads,
         )
-        expander = make_expander(tools, self._predictor, guide)
-        return Beam(guide, expander, make_frontier(settings, self.problem, ranking))
+        own = self._own
+        return Beam(
+            guide,
+            own.expander(tools) if own.expander else make_expander(tools, self._predictor, guide),
+            (own.frontier or make_frontier)(settings, self.problem, ranking),
+        )
 
 
 def assemble(
@@ -120,7 +149,7 @@ def assemble(
     pruner: Pruner | None,
     predictor: LegPredictor | None,
     audit_predictor: LegPredictor | None,
-    ranking: Ranking | None,
+    own: OwnParts,
     rng: np.random.Generator,
     executor: Executor | None,
     threads: int,
@@ -143,7 +172,7 @@ def assemble(
     )
     best = BestTour(problem, settings)
     scouting: Scouting = NoScouting()
-    if predictor is not None and ranking is None and _scouts_fit(problem, settings, timed=timed):
+    if predictor is not None and own.none and _scouts_fit(problem, settings, timed=timed):
         scouts = Scouts(problem, predictor, settings, executor)
         scouting = ScoutedPasses(scouts, pacing, budget, threads)
     passes = Passes(
@@ -168,13 +197,13 @@ def assemble(
         neighbours,
         pruner,
         predictor,
-        ranking,
+        own,
         threads,
     )
 
 
 def _scouts_fit(problem: Problem, settings: SearchSettings, *, timed: bool) -> bool:
-    """Tell whether a search sends out scouts, if it has a predictor and no ranking is given."""
+    """Tell whether a search sends out scouts, if it has a predictor and all parts are ours."""
     wanted = settings.scouts.share if timed else settings.scouts.generations
     plain = settings.ranking in ("weighted", "balanced") and settings.frontier.kind == "depth"
     return bool(wanted) and plain and problem.custom_moves is None

@@ -10,8 +10,10 @@ from numpy.typing import NDArray
 
 from feasibility import Pruner
 from feasibility.classifier.predictor import LegPredictor
-from seqsearch.beam.assembly import Beam, Tools, assemble
+from seqsearch.beam.assembly import Beam, OwnParts, Tools, assemble
 from seqsearch.beam.counters import RankCounters
+from seqsearch.beam.expanders.protocol import MakeExpander
+from seqsearch.beam.frontiers.protocol import MakeFrontier
 from seqsearch.beam.rankings.protocol import Ranking
 from seqsearch.beam.rankings.rebalance import rebalanced
 from seqsearch.beam.result import SearchResult
@@ -33,6 +35,8 @@ def search(
     beam_width: int | None = None,
     settings: SearchSettings | None = None,
     ranking: Ranking | None = None,
+    frontier: MakeFrontier | None = None,
+    expander: MakeExpander | None = None,
     rng: np.random.Generator | None = None,
     executor: Executor | None = None,
     threads: int = 1,
@@ -60,6 +64,9 @@ def search(
         How to search.
     ranking : Ranking, optional
         Which nodes to keep; default: the one that `settings` name.
+    frontier, expander : callable, optional
+        Make the `Frontier` and the `Expander` of each pass; default: those that fit the
+        settings and the problem. Scouts are sent out only where both are left out.
     rng : numpy.random.Generator, optional
         Draws the start epochs; default: seed 0. The same seed gives the same
         result with any executor, unless a time limit cuts the search short.
@@ -107,7 +114,7 @@ def search(
         pruner=pruner,
         predictor=predictor,
         audit_predictor=audit_predictor,
-        ranking=ranking,
+        own=OwnParts(ranking, frontier, expander),
         rng=rng,
         executor=executor,
         threads=threads,

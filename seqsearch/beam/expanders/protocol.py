@@ -1,5 +1,6 @@
 """The `Expander` protocol: from nodes to flyable hops; and the tools that expanders share."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol, final
 
@@ -76,3 +77,7 @@ class Expander(Protocol):
             After it no new work is begun; what is finished counts.
         """
         ...
+
+
+MakeExpander = Callable[[ExpanderTools], Expander]
+"""Makes the expander of a pass from the tools of the search."""

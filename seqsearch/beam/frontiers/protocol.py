@@ -1,11 +1,15 @@
 """The `Frontier` protocol: which of the nodes that wait are expanded next."""
 
+from collections.abc import Callable
 from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
+from seqsearch.beam.rankings.protocol import Ranking
 from seqsearch.core.nodes import Nodes
+from seqsearch.core.problem import Problem
+from seqsearch.settings import SearchSettings
 
 
 @runtime_checkable
@@ -49,3 +53,7 @@ class Frontier(Protocol):
     def waiting(self) -> Nodes:
         """Return all nodes that wait, in the order in which `push` wants them."""
         ...
+
+
+MakeFrontier = Callable[[SearchSettings, Problem, Ranking], Frontier]
+"""Makes the frontier of a pass from its settings, the problem and the ranking."""
