@@ -102,8 +102,7 @@ def search(
         The workers of `executor` died.
     """
     settings = settings or SearchSettings()
-    if beam_width is not None:
-        settings = settings.with_(beam_width=beam_width)
+    settings = settings if beam_width is None else settings.with_(beam_width=beam_width)
     rng = rng or np.random.default_rng(0)
     state = resume or SearchState(settings=settings)
     if resume is not None:
