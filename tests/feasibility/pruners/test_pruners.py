@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from feasibility.errors import InputError
-from feasibility.orbits.mima import lambert_delta_v, mima, mima2
+from feasibility.orbits.lambert import lambert_delta_v
+from feasibility.orbits.mima import mima, mima2
 from feasibility.pruners import (
     AllOf,
     KeepAll,
