@@ -157,7 +157,8 @@ def test_all_of_asks_only_about_survivors_and_counts_by_name():
 
     first = MimaPruner(margin=0.5)
     both = AllOf(first, Recording())
-    mask, pruned = both.keep_with_counts(legs)
+    found = both.survivors(legs)
+    mask, pruned = found.mask, found.pruned
     survivors = first.keep(legs)
     np.testing.assert_array_equal(mask, survivors & (legs.tof_days < 300))
     assert asked == [survivors.sum()]
