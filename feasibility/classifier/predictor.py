@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.legs import Legs
-from feasibility.orbits.lambert import lambert
+from feasibility.orbits.lambert import lambert_delta_v
 
 
 @runtime_checkable
@@ -78,11 +78,8 @@ def lambert_final_mass(legs: Legs) -> NDArray[np.float64]:
     (n,) float64, kg
         At least the dry mass.
     """
-    v_dep, v_arr = lambert(legs.rv_dep[:, :3], legs.rv_arr[:, :3], legs.tof_s, max_revs=0)
-    delta_v = np.linalg.norm(v_dep[:, 0] - legs.rv_dep[:, 3:], axis=1) + np.linalg.norm(
-        v_arr[:, 0] - legs.rv_arr[:, 3:], axis=1
-    )
-    burnt = legs.m0 * -np.expm1(-np.nan_to_num(delta_v, nan=np.inf) / legs.exhaust_velocity)
+    delta_v = lambert_delta_v(legs.rv_dep, legs.rv_arr, legs.tof_s, max_revs=0)
+    burnt = legs.m0 * -np.expm1(-delta_v / legs.exhaust_velocity)
     most = legs.thrust / legs.exhaust_velocity * legs.tof_s
     estimate: NDArray[np.float64] = np.maximum(legs.m0 - np.minimum(burnt, most), legs.m_dry)
     return estimate

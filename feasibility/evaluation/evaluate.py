@@ -13,7 +13,6 @@ from feasibility.classifier.classifier import FeasibilityClassifier
 from feasibility.dataset import Dataset
 from feasibility.evaluation.metrics import Confusion, reliability, roc_curve, summary
 from feasibility.evaluation.peers import Peer, PeerOutcome, ask, near_boundary
-from feasibility.learning.paper.train import labels
 from feasibility.runtime.atomic import atomic_path, write_json, write_text
 from feasibility.runtime.folders import make_folder
 from feasibility.runtime.provenance import provenance
@@ -178,7 +177,7 @@ def evaluate(
         The dataset has only one class.
     """
     part = dataset.take(np.flatnonzero(dataset.labelled))
-    y = labels(part)
+    y = part.flyable
     classifier.assess(part.legs.take([0]))  # compiles what there is to compile
     began = time.process_time()
     probability, inside = classifier.assess(part.legs)

@@ -5,9 +5,8 @@ import pytest
 
 from feasibility.constants import AU, DAY_S, MU_SUN
 from feasibility.errors import InputError
-from feasibility.orbits.lambert import lambert
+from feasibility.orbits.lambert import lambert, lambert_delta_v
 from feasibility.orbits.mima import (
-    lambert_delta_v,
     mima,
     mima2,
     mima2_branches,
