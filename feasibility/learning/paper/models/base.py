@@ -29,18 +29,13 @@ class Epoch:
     seconds: float
 
 
-@final
-class StopTraining(Exception):  # noqa: N818 (a request, not an error)
-    """Raised by `on_epoch` to end training; the model keeps what it has learned."""
-
-
 OnEpoch = Callable[[Epoch], None]
 
 
 class Model(Protocol):
     """A classifier of legs; with n the number of legs and k of features.
 
-    Prediction is computed from `to_arrays` by `inference`, in training as in a
+    Prediction is computed from `to_arrays` by `paper.predictors`, in training as in a
     search, so that the two cannot differ.
     """
 
@@ -83,7 +78,7 @@ class Model(Protocol):
         ...
 
     def to_arrays(self) -> dict[str, NDArray[Any]]:
-        """Return all that prediction needs, see `inference`."""
+        """Return all that prediction needs, see `paper.predictors`."""
         ...
 
 
