@@ -1,7 +1,6 @@
 """The `LegPredictor` protocol: what a search asks to order candidate legs before it solves any."""
 
-from dataclasses import dataclass
-from typing import Final, Protocol, final, runtime_checkable
+from typing import Final, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,32 +33,6 @@ class QuickPredictor(LegPredictor, Protocol):
     def quick_margin(self, legs: Legs, /) -> NDArray[np.float64]:
         """Return (n,) a cheap estimate of m*/m0; NaN where nothing is known."""
         ...
-
-
-class _MarginModel(Protocol):
-    def margin(self, legs: Legs, /) -> NDArray[np.float64]: ...
-
-
-@final
-@dataclass(frozen=True)
-class LambertPropellant:
-    """Makes a predictor of anything that knows margins, with Lambert's estimate of final masses.
-
-    Parameters
-    ----------
-    model : object
-        Has a method `margin(legs) -> (n,)`.
-    """
-
-    model: _MarginModel
-
-    def margin(self, legs: Legs, /) -> NDArray[np.float64]:
-        """Return (n,) what the model says."""
-        return self.model.margin(legs)
-
-    def final_mass(self, legs: Legs, /) -> NDArray[np.float64]:
-        """Return (n,) kg, `lambert_final_mass`."""
-        return lambert_final_mass(legs)
 
 
 def lambert_final_mass(legs: Legs) -> NDArray[np.float64]:
