@@ -140,17 +140,7 @@ def train(
     examples = Examples.of(dataset)
     part = split_pairs(examples.pairs, SHARES, streams[0])
     learned, validation, calibration = (np.flatnonzero(part == k) for k in range(3))
-    for name, rows in (
-        ("training", learned),
-        ("validation", validation),
-        ("calibration", calibration),
-    ):
-        feasible = int(examples.y[rows].sum())
-        if feasible in (0, len(rows)):
-            raise InputError(
-                f"{name} part: {feasible} of {len(rows)} legs are feasible, expected both "
-                "classes; generate more legs"
-            )
+    _check_classes(examples.y, training=learned, validation=validation, calibration=calibration)
 
     columns = np.arange(len(FEATURES))
     if recipe.n_features < len(FEATURES):
@@ -205,6 +195,17 @@ def train(
         },
         provenance={**provenance(), "dataset": dict(dataset.metadata)},
     )
+
+
+def _check_classes(y: NDArray[np.bool_], **parts: NDArray[np.intp]) -> None:
+    """Raise InputError where a part, by its name, lacks a class."""
+    for name, rows in parts.items():
+        feasible = int(y[rows].sum())
+        if feasible in (0, len(rows)):
+            raise InputError(
+                f"{name} part: {feasible} of {len(rows)} legs are feasible, expected both "
+                "classes; generate more legs"
+            )
 
 
 def _domain(
