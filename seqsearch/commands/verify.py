@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+from feasibility.runtime.interrupts import say
 from seqsearch.commands.options import sequence_path
 
 if TYPE_CHECKING:
@@ -64,9 +65,9 @@ def _verify(options: argparse.Namespace) -> int:
     if fleet:
         together = Verification((check_disjoint(tours),))
         passed.append(together.passed)
-        print(f"{sum(tour.n_asteroids for tour in tours)} asteroids on {len(tours)} probes")
-        print(together.table())
-    print("verified" if all(passed) else "NOT verified")
+        say(f"{sum(tour.n_asteroids for tour in tours)} asteroids on {len(tours)} probes")
+        say(together.table())
+    say("verified" if all(passed) else "NOT verified")
     return 0 if all(passed) else 1
 
 
@@ -76,25 +77,25 @@ def _verified(file: Path, tour: "Tour", problem: str | None, table: "Catalogue |
     from seqsearch.problems.rules_of import differences, rules_of
     from seqsearch.tours.verify import verify_tour
 
-    print(tour.one_line())
+    say(tour.one_line())
     config, source = _problem_of(file, tour, problem)
     if config is None:
         verification = verify_tour(tour, table)
         _print(verification, file, tour)
-        print(
+        say(
             "checked against the rules in its own file alone, which prove nothing; "
             "say whose rules hold with --problem NAME|FILE"
         )
         return False
     table = table or table_at_hand(config)
     rules = rules_of(config, tour, table)
-    print(f"rules of problem {rules.name}, from {source}")
+    say(f"rules of problem {rules.name}, from {source}")
     for difference in differences(tour.rules, rules):
-        print(f"the file states other rules: {difference}")
+        say(f"the file states other rules: {difference}")
     verification = verify_tour(tour, table, rules)
     passed = _print(verification, file, tour)
     if not passed and verify_tour(tour, table).passed:
-        print("it keeps only the rules in its own file")
+        say("it keeps only the rules in its own file")
     return passed
 
 
@@ -105,8 +106,8 @@ def _print(verification: "Verification", file: Path, tour: "Tour") -> bool:
     beside = file.with_suffix(".csv")
     if beside.is_file():
         verification = Verification((*verification.checks, check_csv(tour, beside)))
-    print(tour.summary())
-    print(verification.table())
+    say(tour.summary())
+    say(verification.table())
     return verification.passed
 
 

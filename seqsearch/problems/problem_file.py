@@ -1,5 +1,6 @@
 """What a problem's TOML file may say, and how it becomes a `Problem` and `SearchSettings`."""
 
+import re
 from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, Final, final
@@ -44,6 +45,13 @@ class ProblemTable(_Table, frozen=True, kw_only=True):
 
     name: str
     description: str = ""
+
+    def __post_init__(self) -> None:
+        # Run folders are named after problems.
+        if re.fullmatch(r"[^\W_][^/\\\x00-\x1f]{0,99}", self.name) is None:
+            raise ValueError(
+                f"name {self.name!r}, expected a plain name that begins with a letter or digit"
+            )
 
 
 @final

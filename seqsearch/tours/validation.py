@@ -39,8 +39,8 @@ def check_numbers(tour: Tour) -> None:
 
 
 def _problems(tour: Tour) -> Iterator[str]:
-    if not tour.bodies:
-        yield "has no body, expected the start body at least"
+    if tour.legs and not tour.bodies:
+        yield f"has {len(tour.legs)} legs and no body"
     if len(tour.legs) > _MAX_LEGS:
         yield f"has {len(tour.legs)} legs, expected at most {_MAX_LEGS}"
     yield from _of_rules(tour.rules)
