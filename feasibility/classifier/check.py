@@ -90,8 +90,8 @@ def _check_method(
                 f"{label}: not row-wise: a leg gets another answer when {what}"
             )
     with ThreadPoolExecutor(_THREADS) as pool:
-        told = list(pool.map(lambda _: _ask(predictor, name, legs), range(2 * _THREADS)))
-    if not all(_same(one, answer) for one in told):
+        at_once = list(pool.map(lambda _: _ask(predictor, name, legs), range(2 * _THREADS)))
+    if not all(_same(one, answer) for one in at_once):
         raise PredictorContractError(
             f"{label}: not pure: the answers change where {_THREADS} threads ask at once"
         )

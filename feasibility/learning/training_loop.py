@@ -118,6 +118,7 @@ class Checkpoint:
         return None if path is None else cls(path, identity())
 
 
+@final
 @dataclass
 class _Progress:
     """Where a training stands between two epochs."""

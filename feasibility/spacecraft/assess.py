@@ -33,7 +33,7 @@ class Share:
     Attributes
     ----------
     count, of : int
-        So many of so many.
+        How often it was so, and of how many.
     """
 
     count: int

@@ -55,7 +55,7 @@ class MarginRecipe:
     learning_rate : float
         Largest one.
     patience : int, optional
-        Stop when the validation loss has not fallen for so many epochs.
+        Stop when the validation loss has not fallen for this many epochs.
     seed : int
         Seed of split, weights and order.
     device : str
@@ -193,7 +193,11 @@ def fit_net(
     data = (error[learned],) if start is None else (error[learned], start["weight_0"])
     train_network(
         Learner(network, optimiser, work.train, MarginEpoch, schedule),
-        LoopRule(epochs, recipe.patience, best_loss=math.inf if start is None else work.held()),
+        LoopRule(
+            epochs,
+            recipe.patience,
+            best_loss=math.inf if start is None else work.validation_loss(),
+        ),
         checkpoint=Checkpoint.at(checkpoint, lambda: training_identity(settings, *data)),
         on_epoch=on_epoch,
         replay=True,
@@ -233,9 +237,9 @@ class _Epochs:
             self.optimiser.step()
             self.schedule.step()
             total += loss.item()
-        return MarginEpoch(number, self.unit * total / batches, self.held())
+        return MarginEpoch(number, self.unit * total / batches, self.validation_loss())
 
-    def held(self) -> float:
+    def validation_loss(self) -> float:
         """Return the loss on the validation rows."""
         torch = load_extra("torch")
         with torch.no_grad():

@@ -1,6 +1,6 @@
 """`Baseline`: what the four classifiers that learn in one go have in common."""
 
-from abc import abstractmethod
+from abc import ABC, abstractmethod
 from dataclasses import asdict
 from typing import Any, ClassVar, Generic, Protocol, Self, TypeVar
 
@@ -24,7 +24,7 @@ class BaselineConfig(Protocol):
 C = TypeVar("C", bound=BaselineConfig)
 
 
-class Baseline(Fitted, Generic[C]):
+class Baseline(Fitted, Generic[C], ABC):
     """A classifier that learns in one go from a limited number of rows.
 
     Children say in `_fit` how; they have no epochs, and no use for validation rows.

@@ -54,13 +54,13 @@ class DnnConfig:
     learning_rate : float
         At the first epoch.
     drop_period : int
-        T_drop: the rate falls every so many epochs ...
+        T_drop: the rate falls each time this many epochs have passed ...
     drop_factor : float
         ... by this factor, d.
     epochs : int
         How many at most; by default the rate has then fallen three times for DNN1.
     patience : int, optional
-        Stop early, when the validation loss has not fallen for so many epochs.
+        Stop early, when the validation loss has not fallen for this many epochs.
     keep_best : bool
         Keep the weights of the lowest validation loss instead of the last ones. With neither,
         as in the paper, validation rows are only reported on.

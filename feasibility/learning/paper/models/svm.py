@@ -44,7 +44,7 @@ class Svm(Baseline[SvmConfig]):
     def _fit(
         self, X: NDArray[np.float64], y: NDArray[np.bool_], rng: np.random.Generator
     ) -> dict[str, NDArray[Any]]:
-        held, seen = _held_out(y, rng)
+        sigmoid_rows, seen = _held_out(y, rng)
         gamma = 1.0 / X.shape[1] if self._config.gamma is None else self._config.gamma
         machine = load_extra("sklearn.svm").SVC(C=self._config.C, gamma=gamma, cache_size=500)
         machine.fit(X[seen], y[seen])
@@ -55,9 +55,9 @@ class Svm(Baseline[SvmConfig]):
             "gamma": np.array(gamma),
             "sigmoid": np.array([1.0, 0.0]),
         }
-        decision = VectorsPredictor(arrays).decide(X[held])
+        decision = VectorsPredictor(arrays).decide(X[sigmoid_rows])
         sigmoid = load_extra("sklearn.linear_model").LogisticRegression(C=1e3)
-        sigmoid.fit(decision[:, None], y[held])
+        sigmoid.fit(decision[:, None], y[sigmoid_rows])
         arrays["sigmoid"] = np.array([sigmoid.coef_[0, 0], sigmoid.intercept_[0]])
         return arrays
 
@@ -66,12 +66,12 @@ def _held_out(
     y: NDArray[np.bool_], rng: np.random.Generator
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Return rows for the sigmoid, at least one of each class, and the others."""
-    held = []
+    by_class = []
     for rows in (np.flatnonzero(y), np.flatnonzero(~y)):
         size = max(1, round(_SHARE_FOR_SIGMOID * len(rows)))
-        held.append(rng.choice(rows, size, replace=False))
-    chosen = np.sort(np.concatenate(held))
+        by_class.append(rng.choice(rows, size, replace=False))
+    chosen = np.sort(np.concatenate(by_class))
     # A class with a single row needs it in both places.
-    single = [rows for rows in held if np.sum(y == y[rows[0]]) == 1]
+    single = [rows for rows in by_class if np.sum(y == y[rows[0]]) == 1]
     seen = np.setdiff1d(np.arange(len(y)), chosen)
     return chosen, np.sort(np.concatenate([seen, *single])).astype(np.int64)
