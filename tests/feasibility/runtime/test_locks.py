@@ -10,7 +10,8 @@ from feasibility.runtime.atomic import atomic_path, write_text
 from feasibility.runtime.locks import folder_lock
 
 _HOLD = (
-    "import sys, time; from pathlib import Path; from feasibility.runtime.locks import folder_lock\n"
+    "import sys, time; from pathlib import Path\n"
+    "from feasibility.runtime.locks import folder_lock\n"
     "with folder_lock(Path(sys.argv[1])):\n    print('held', flush=True); time.sleep(60)"
 )
 
@@ -30,9 +31,9 @@ def held(tmp_path):
 
 def test_a_second_process_gets_one_line_that_names_the_first(held):
     folder, process = held
-    with pytest.raises(InputError, match=f"in use by another process \\({process.pid}\\)"):
-        with folder_lock(folder):
-            pass
+    message = f"in use by another process \\({process.pid}\\)"
+    with pytest.raises(InputError, match=message), folder_lock(folder):
+        pass
 
 
 def test_the_lock_of_a_dead_process_is_taken_over(held):
@@ -58,16 +59,23 @@ def test_what_a_killed_process_left_is_removed_and_nothing_else(tmp_path):
 
 
 def test_a_folder_that_is_not_there_cannot_be_held(tmp_path):
-    with pytest.raises(InputError, match="cannot be written to"):
-        with folder_lock(tmp_path / "missing"):
-            pass
+    with (
+        pytest.raises(InputError, match="cannot be written to"),
+        folder_lock(tmp_path / "missing"),
+    ):
+        pass
 
 
 def test_a_failed_write_leaves_the_old_file_and_nothing_else(tmp_path):
     path = tmp_path / "a.txt"
     write_text(path, "old")
-    with pytest.raises(RuntimeError), atomic_path(path) as temporary:
-        temporary.write_text("new")
-        raise RuntimeError
+
+    def fail():
+        with atomic_path(path) as temporary:
+            temporary.write_text("new")
+            raise RuntimeError
+
+    with pytest.raises(RuntimeError):
+        fail()
     assert path.read_text() == "old"
     assert [p.name for p in tmp_path.iterdir()] == ["a.txt"]
