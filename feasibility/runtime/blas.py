@@ -8,13 +8,9 @@ import functools
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, final
 
 from threadpoolctl import ThreadpoolController
-
-_lock = threading.Lock()
-_inside = 0
-_before: list[tuple[Any, int]] = []
 
 
 @contextmanager
@@ -24,24 +20,37 @@ def one_blas_thread() -> Iterator[None]:
     May be entered again, also from several threads; what was set before returns when the
     last has left.
     """
-    global _inside
-    with _lock:
-        _inside += 1
-        if _inside == 1:
-            for library in _libraries():
-                threads = library.get_num_threads()
-                if threads != 1:
-                    _before.append((library, threads))
-                    library.set_num_threads(1)
+    _hold.enter()
     try:
         yield
     finally:
-        with _lock:
-            _inside -= 1
-            if _inside == 0:
-                while _before:
-                    library, threads = _before.pop()
-                    library.set_num_threads(threads)
+        _hold.leave()
+
+
+@final
+class _Hold:
+    """Counts who is inside, and remembers what was set before the first came in."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._inside = 0
+        self._before: list[tuple[Any, int]] = []
+
+    def enter(self) -> None:
+        with self._lock:
+            self._inside += 1
+            if self._inside == 1:
+                threads = [(library, library.get_num_threads()) for library in _libraries()]
+                self._before = [(library, n) for library, n in threads if n != 1]
+                for library, _ in self._before:
+                    library.set_num_threads(1)
+
+    def leave(self) -> None:
+        with self._lock:
+            self._inside -= 1
+            if self._inside == 0:
+                for library, n in self._before:
+                    library.set_num_threads(n)
 
 
 @functools.cache
@@ -49,3 +58,6 @@ def _libraries() -> list[Any]:
     """Return the BLAS libraries of this process; looking for them takes a millisecond."""
     controllers: list[Any] = ThreadpoolController().select(user_api="blas").lib_controllers
     return controllers
+
+
+_hold = _Hold()
