@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from feasibility import Legs
 from feasibility.classifier.predictor import LegPredictor, QuickPredictor
 from seqsearch.core.margin_curves import MarginCurves, flight_times
-from seqsearch.problems.gtoc5.directions import even_directions
-from seqsearch.problems.gtoc5.lambert_departure import lambert_departure
+from seqsearch.problems.moves.directions import even_directions
+from seqsearch.problems.moves.lambert_departure import lambert_departure
 from seqsearch.problems.gtoc5.leg_maker import LegMaker
 from seqsearch.problems.gtoc5.self_fly_by import shortest_self_fly_by_days
 from seqsearch.problems.gtoc5.visits import Visits

@@ -18,10 +18,10 @@ from seqsearch.core.custom_moves import Proposal
 from seqsearch.core.nodes import Nodes
 from seqsearch.core.problem import Hops
 from seqsearch.core.tree import FlownLeg
-from seqsearch.problems.gtoc5.directions import even_directions
+from seqsearch.problems.moves.directions import even_directions
 from seqsearch.problems.gtoc5.element_distance import phase_free_points
 from seqsearch.problems.gtoc5.forecast import FLY_BY_STRETCH, Gtoc5Forecast
-from seqsearch.problems.gtoc5.lambert_departure import lambert_departure
+from seqsearch.problems.moves.lambert_departure import lambert_departure
 from seqsearch.problems.gtoc5.leg_maker import LegMaker
 from seqsearch.problems.gtoc5.rules import Gtoc5Rules
 from seqsearch.problems.gtoc5.self_fly_by import shortest_self_fly_by_days
