@@ -16,7 +16,6 @@ With --beam-width instead of a time limit, nothing but the seconds depends on th
 """
 
 import argparse
-import os
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,7 +26,7 @@ import numpy as np
 from feasibility.classifier.classifier import FeasibilityClassifier
 from feasibility.runtime.atomic import write_text
 from feasibility.runtime.provenance import provenance
-from feasibility.runtime.workers import worker_pool
+from feasibility.runtime.workers import default_workers, worker_pool
 from feasibility.sims_flanagan.fast.compilation import (
     compile_kernels,
     prefer_fast_compilation,
@@ -36,7 +35,7 @@ from feasibility.sims_flanagan.fast.compilation import (
 from seqsearch.beam.beam_search import search
 from seqsearch.beam.state import SearchState
 from seqsearch.commands.cli import parse_duration
-from seqsearch.core.problem import TourProblem
+from seqsearch.core.problem import Problem
 from seqsearch.problems.problem_file import build_problem, read_config, with_catalogue
 from seqsearch.pruning.audit_estimate import AuditEstimate
 from seqsearch.pruning.pruner_spec import parse_pruner
@@ -68,7 +67,7 @@ class Row:
 
 
 def run(
-    problem: TourProblem, settings: SearchSettings, pruner: str, options: argparse.Namespace
+    problem: Problem, settings: SearchSettings, pruner: str, options: argparse.Namespace
 ) -> Row:
     steps: list[tuple[int, int]] = []
 
@@ -137,7 +136,7 @@ def main() -> None:
         "--unpruned-width", type=int, default=15, help="widest beam without a pruner (default 15)"
     )
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
+    parser.add_argument("--workers", type=int, default=default_workers())
     parser.add_argument("--pruners", nargs="+", default=PRUNERS, help="the first is the measure")
     parser.add_argument("--out", type=Path, help="also write the figures as JSON")
     options = parser.parse_args()

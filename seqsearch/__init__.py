@@ -7,28 +7,34 @@ import importlib
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from seqsearch.beam.beam_search import SearchResult, search
-    from seqsearch.beam.rankings.protocol import Ranking, TimePropellantRanking
+    from seqsearch.beam.beam_search import search
+    from seqsearch.beam.rankings.protocol import Ranking
+    from seqsearch.beam.rankings.time_propellant import TimePropellantRanking
+    from seqsearch.beam.result import SearchResult
+    from seqsearch.core.problem import Problem
     from seqsearch.problems.problem_file import build_problem, load_problem, read_config
-    from seqsearch.problems.rendezvous import Problem
+    from seqsearch.problems.rendezvous import RendezvousProblem
     from seqsearch.settings import SearchSettings
-    from seqsearch.tours.tour import Tour, read_tour
-    from seqsearch.tours.verify import Verification, verify_tour
+    from seqsearch.tours.checks import Verification
+    from seqsearch.tours.tour import Tour
+    from seqsearch.tours.tour_files import read_tour
+    from seqsearch.tours.verify import verify_tour
 
 __version__ = "0.1.0"
 
 _HOMES = {
-    "Problem": "seqsearch.problems.rendezvous",
+    "Problem": "seqsearch.core.problem",
     "Ranking": "seqsearch.beam.rankings.protocol",
-    "SearchResult": "seqsearch.beam.beam_search",
+    "RendezvousProblem": "seqsearch.problems.rendezvous",
+    "SearchResult": "seqsearch.beam.result",
     "SearchSettings": "seqsearch.settings",
-    "TimePropellantRanking": "seqsearch.beam.rankings.protocol",
+    "TimePropellantRanking": "seqsearch.beam.rankings.time_propellant",
     "Tour": "seqsearch.tours.tour",
-    "Verification": "seqsearch.tours.verify",
+    "Verification": "seqsearch.tours.checks",
     "build_problem": "seqsearch.problems.problem_file",
     "load_problem": "seqsearch.problems.problem_file",
     "read_config": "seqsearch.problems.problem_file",
-    "read_tour": "seqsearch.tours.tour",
+    "read_tour": "seqsearch.tours.tour_files",
     "search": "seqsearch.beam.beam_search",
     "verify_tour": "seqsearch.tours.verify",
 }
@@ -36,6 +42,7 @@ _HOMES = {
 __all__ = [
     "Problem",
     "Ranking",
+    "RendezvousProblem",
     "SearchResult",
     "SearchSettings",
     "TimePropellantRanking",

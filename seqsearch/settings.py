@@ -1,6 +1,7 @@
 """`SearchSettings`: how the search goes about it; the ``[search]`` table of a problem file."""
 
-from typing import Annotated, Literal, final
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal, final
 
 import msgspec
 import numpy as np
@@ -13,8 +14,81 @@ _Positive = Annotated[float, Meta(gt=0)]
 _Count = Annotated[int, Meta(ge=1)]
 
 
+class _Table(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A TOML table in which every key is known."""
+
+
 @final
-class SearchSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class FrontierSettings(_Table, frozen=True, kw_only=True):
+    """Which nodes compete with each other, and how many alike are kept.
+
+    Parameters
+    ----------
+    kind : str
+        Nodes compete with those of equal ``"depth"``, or of equal elapsed time: ``"time"``.
+    max_per_parent : int
+        Most children of one node that are kept.
+    max_per_cell : int
+        Most nodes kept at one rank at one asteroid within the same `cell_days`.
+    cell_days : float
+        Width of the epoch cells of `max_per_cell`.
+    max_start_share : float
+        Most nodes kept at one rank that started at the same body, as a share of the beam
+        width; 1 for no limit.
+    slice_days : float
+        Width of the slices of elapsed time, for the kind ``"time"``.
+    nominal_visits : int
+        Visits of a good tour, by which the kind ``"time"`` values one more.
+    """
+
+    kind: Literal["depth", "time"] = "depth"
+    max_per_parent: _Count = 10
+    max_per_cell: _Count = 3
+    cell_days: _Positive = 20.0
+    max_start_share: Annotated[float, Meta(gt=0, le=1)] = 0.1
+    slice_days: _Positive = 40.0
+    nominal_visits: _Count = 14
+
+
+@final
+class ScoutSettings(_Table, frozen=True, kw_only=True):
+    """Beams of predicted legs that look for itineraries before a pass.
+
+    They need a predictor, and ``ranking`` ``"weighted"`` or ``"balanced"`` with the frontier
+    ``"depth"``. Their own ranking is ``"balanced"``.
+
+    Parameters
+    ----------
+    generations : int
+        Where there is no time limit, how often four scouts are sent out before each pass,
+        which then keeps to the best itineraries that they found; 0 for no scouts.
+    share : float
+        Under a time limit, the share of each pass that is spent on scouting.
+    width : int
+        Beam width of a scout.
+    """
+
+    generations: Annotated[int, Meta(ge=0)] = 0
+    share: Annotated[float, Meta(ge=0, lt=1)] = 0.75
+    width: _Count = 300
+
+
+@final
+class AuditSettings(_Table, frozen=True, kw_only=True):
+    """How much is spent on learning what pruning costs.
+
+    Parameters
+    ----------
+    per_rank : int
+        Pruned candidates of each rank that are optimised all the same, and half as many
+        kept ones; 0 for no audit.
+    """
+
+    per_rank: Annotated[int, Meta(ge=0)] = 100
+
+
+@final
+class SearchSettings(_Table, frozen=True, kw_only=True):
     """Settings of the beam search, all with defaults.
 
     Parameters
@@ -24,6 +98,8 @@ class SearchSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
     max_beam_width : int
         Most nodes kept at one rank under a time limit, where passes are as wide as the
         time allows.
+    passes : int
+        Beams run one after another, each with starts of its own.
     starts : int
         Start nodes of a pass: the asteroid-epoch pairs with the densest neighbourhoods.
     start_epochs : int
@@ -52,50 +128,28 @@ class SearchSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
     solver : str
         Leg solver for the full optimisation: ``"fast"`` or ``"reference"``.
     solves_per_rank : int
-        Most legs that are optimised at one rank, the most promising first.
+        Most hops that are optimised at one rank, the most promising first.
     flyable_per_target : int
         Flight times wanted for each node and target, shortest first.
-    max_per_parent : int
-        Most children of one node that are kept.
-    max_per_cell : int
-        Most nodes kept at one rank at one asteroid within the same `cell_days`.
-    max_start_share : float
-        Most nodes kept at one rank that started at the same body, as a share of the beam
-        width; 1 for no limit.
-    cell_days : float
-        Width of the epoch cells of `max_per_cell`.
     time_weight, propellant_weight : float
         Weights of the used shares of time and propellant in the ranking.
-    audit_per_rank : int
-        Pruned candidates of each rank that are optimised all the same, to learn what
-        pruning costs, and half as many kept ones; 0 for no audit.
     ranking : str
         Which nodes are better: ``"weighted"`` time and propellant, ``"balanced"``, where what
         is scarcer counts more, ``"pareto"`` fronts of both, or ``"potential"``, weighted with a
-        penalty for few ways on (needs a classifier).
+        penalty where few targets can be reached (needs a classifier).
     potential_weight : float
-        Penalty of a node without a way on, for the ranking ``"potential"``.
-    frontier : str
-        Nodes compete with those of equal ``"depth"``, or of equal elapsed time: ``"time"``.
-    slice_days : float
-        Width of the slices of elapsed time, for the frontier ``"time"``.
-    nominal_visits : int
-        Visits of a good tour, by which the frontier ``"time"`` values one more.
-    passes : int
-        Beams run one after another, each with starts of its own.
-    scout_generations : int
-        Where there is no time limit, how often four scouts are sent out before each pass,
-        which then keeps to the best itineraries that they found; 0 for no scouts. They need a
-        predictor, and ``ranking`` ``"weighted"`` or ``"balanced"`` with ``frontier = "depth"``.
-        Their own ranking is ``"balanced"``.
-    scout_share : float
-        Under a time limit, the share of each pass that is spent on scouting.
-    scout_width : int
-        Beam width of a scout.
+        Penalty of a node from which no target can be reached, for the ranking ``"potential"``.
+    frontier : FrontierSettings
+        The table ``[search.frontier]``.
+    scouts : ScoutSettings
+        The table ``[search.scouts]``.
+    audit : AuditSettings
+        The table ``[search.audit]``.
     """
 
     beam_width: _Count = 200
     max_beam_width: _Count = 6000
+    passes: _Count = 1
     starts: _Count = 300
     start_epochs: _Count = 40
     screen_legs: _Count = 150_000
@@ -112,22 +166,13 @@ class SearchSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
     solver: str = "fast"
     solves_per_rank: _Count = 8000
     flyable_per_target: _Count = 2
-    max_per_parent: _Count = 10
-    max_per_cell: _Count = 3
-    max_start_share: Annotated[float, Meta(gt=0, le=1)] = 0.1
-    cell_days: _Positive = 20.0
     time_weight: Annotated[float, Meta(ge=0)] = 1.0
     propellant_weight: Annotated[float, Meta(ge=0)] = 0.6
-    audit_per_rank: Annotated[int, Meta(ge=0)] = 100
     ranking: Literal["weighted", "balanced", "pareto", "potential"] = "weighted"
     potential_weight: Annotated[float, Meta(ge=0)] = 0.1
-    frontier: Literal["depth", "time"] = "depth"
-    slice_days: _Positive = 40.0
-    nominal_visits: _Count = 14
-    passes: _Count = 1
-    scout_generations: Annotated[int, Meta(ge=0)] = 0
-    scout_share: Annotated[float, Meta(ge=0, lt=1)] = 0.75
-    scout_width: _Count = 300
+    frontier: FrontierSettings = msgspec.field(default_factory=FrontierSettings)
+    scouts: ScoutSettings = msgspec.field(default_factory=ScoutSettings)
+    audit: AuditSettings = msgspec.field(default_factory=AuditSettings)
 
     def __post_init__(self) -> None:
         if self.tof_days_max < self.tof_days_min:
@@ -139,14 +184,17 @@ class SearchSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
             raise ValueError("departure_delays_days is empty, expected at least one delay")
         if self.time_weight + self.propellant_weight <= 0:
             raise ValueError("time_weight and propellant_weight are both zero")
-        if self.frontier == "time" and self.ranking == "pareto":
+        if self.frontier.kind == "time" and self.ranking == "pareto":
             raise ValueError(
-                'frontier = "time" cannot weigh a visit more in ranking = "pareto", '
+                'a frontier of kind "time" cannot weigh a visit more in ranking = "pareto", '
                 'expected "weighted" or "potential"'
             )
 
     def with_(self, **changes: object) -> "SearchSettings":
         """Return the settings with some values replaced, validated.
+
+        Values of tables are given as dictionaries, of which the other keys stay:
+        ``settings.with_(beam_width=40, frontier={"max_per_cell": 1})``.
 
         Raises
         ------
@@ -154,7 +202,8 @@ class SearchSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
             An unknown name or a value out of range.
         """
         try:
-            return msgspec.convert(msgspec.to_builtins(self) | changes, type=SearchSettings)
+            merged = _merged(msgspec.to_builtins(self), changes)
+            return msgspec.convert(merged, type=SearchSettings)
         except msgspec.ValidationError as error:
             raise InputError(f"search settings: {error}") from None
 
@@ -164,3 +213,11 @@ class SearchSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
         if steps > 10_000:
             raise InputError(f"search: {steps} flight times per target, expected at most 10000")
         return self.tof_days_min + self.tof_days_step * np.arange(steps + 1, dtype=np.float64)
+
+
+def _merged(values: dict[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Return values with changes, those of nested tables key by key."""
+    return values | {
+        key: _merged(values[key], change) if isinstance(change, Mapping) else change
+        for key, change in changes.items()
+    }

@@ -20,6 +20,7 @@ import numpy as np
 from feasibility import FeasibilityClassifier
 from feasibility.dataset import Dataset, read_dataset
 from feasibility.evaluation.evaluate import evaluate
+from feasibility.evaluation.tables import markdown_table
 from feasibility.learning.margin.train import MarginRecipe, train_margin
 from feasibility.runtime.atomic import atomic_path, write_text
 
@@ -62,16 +63,18 @@ def measures(classifier: FeasibilityClassifier, tests: dict[str, Dataset]) -> di
 
 def table(curve: dict[int, dict[str, dict[str, float]]]) -> str:
     """Return the figures as Markdown."""
-    lines = [
-        "| legs | search | within 15 % | within 5 % | error of log m* | table1, balanced | "
-        "within 15 % | within 5 % | nea, balanced | within 15 % | within 5 % |",
-        "|---|---|---|---|---|---|---|---|---|---|---|",
+    tests = [
+        name
+        for shown in ("search", "table1, balanced", "nea, balanced")
+        for name in (shown, "within 15 %", "within 5 %")
     ]
+    headers = ["legs", *tests[:3], "error of log m*", *tests[3:]]
+    rows = []
     for legs, found in sorted(curve.items()):
         cells = [f"{found[test][name]:.4f}" for test in TESTS for name in SHOWN[test]]
         cells.insert(3, f"{found['search']['median_log_margin_error_near']:.5f}")
-        lines.append(f"| {legs} | " + " | ".join(cells) + " |")
-    return "\n".join(lines)
+        rows.append([str(legs), *cells])
+    return markdown_table(headers, rows)
 
 
 def draw(curve: dict[int, dict[str, dict[str, float]]], path: Path) -> None:

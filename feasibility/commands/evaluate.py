@@ -1,7 +1,6 @@
 """The command ``feasibility evaluate``."""
 
 import argparse
-import json
 from pathlib import Path
 from typing import Any, Final
 
@@ -59,7 +58,7 @@ def run(options: argparse.Namespace) -> int:
     from feasibility.dataset import read_dataset
     from feasibility.evaluation.evaluate import by_family, evaluate
     from feasibility.evaluation.peers import known_peers
-    from feasibility.runtime.atomic import write_text
+    from feasibility.runtime.atomic import write_json, write_text
 
     classifier = FeasibilityClassifier.load(options.model)
     folders = [Path(dataset) for dataset in options.dataset]
@@ -84,7 +83,7 @@ def run(options: argparse.Namespace) -> int:
         print(f"## all\n\n{table}")
         if options.out is not None:
             whole = {name: evaluation.to_dict() for name, evaluation in evaluations.items()}
-            write_text(Path(options.out) / "evaluation.json", json.dumps(whole, indent=1) + "\n")
+            write_json(Path(options.out) / "evaluation.json", whole)
             parts = [f"## {name}\n\n{one.table()}" for name, one in evaluations.items()]
             text = "\n".join([f"# {model}\n\n{table}", *parts])
             write_text(Path(options.out) / "evaluation.md", text)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from feasibility.dataset.columns import COLUMNS
 from feasibility.errors import InputError, MissingDependencyError
-from feasibility.runtime.atomic import atomic_path, write_text
+from feasibility.runtime.atomic import atomic_path, write_json
 
 FORMAT: Final = 1
 """Version of the layout; readers refuse others."""
@@ -107,7 +107,7 @@ def write_metadata(folder: Path, metadata: Mapping[str, Any]) -> None:
     """
     columns = [asdict(column) for column in COLUMNS]
     record = {"format": FORMAT, **metadata, "columns": columns}
-    write_text(folder / METADATA, json.dumps(record, indent=1) + "\n")
+    write_json(folder / METADATA, record)
 
 
 def names_only(metadata: Mapping[str, Any]) -> dict[str, Any]:

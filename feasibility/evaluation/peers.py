@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from feasibility.constants import MU_SUN
 from feasibility.evaluation.metrics import Confusion, auc
 from feasibility.legs import Legs
-from feasibility.orbits.mima import lambert_delta_v, mima, mima2
+from feasibility.orbits.lambert import lambert_delta_v
+from feasibility.orbits.mima import mima, mima2
 
 _Array = NDArray[np.float64]
 

@@ -1,8 +1,9 @@
 """`Catalogue`: many bodies on Kepler orbits, and where they are at any epoch."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from types import MappingProxyType
 from typing import Any, final
 
 import numpy as np
@@ -10,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from feasibility.constants import DAY_S, MU_SUN
 from feasibility.errors import InputError
-from feasibility.orbits.elements import perifocal_axes
+from feasibility.orbits.classical import perifocal_axes
 
 
 @final
@@ -34,12 +35,15 @@ class Catalogue:
         at the epoch, heliocentric J2000 ecliptic.
     source : str
         Where the bodies come from: a file name, or how they were made.
+    extra : mapping of str to array_like, optional
+        (n,) float64 each: further numeric columns of the table by name, in its units; values
+        may be NaN. Motion does not depend on them.
 
     Raises
     ------
     InputError
-        A shape does not fit, a value is not finite, an orbit is not an ellipse
-        (a <= 0 or e outside [0, 1)), or an id occurs twice. The message names
+        A shape does not fit, an epoch or element is not finite, an orbit is not an
+        ellipse (a <= 0 or e outside [0, 1)), or an id occurs twice. The message names
         the first bad row.
 
     Examples
@@ -55,6 +59,7 @@ class Catalogue:
     epoch_mjd2000: NDArray[np.float64]
     elements: NDArray[np.float64]
     source: str
+    extra: Mapping[str, NDArray[np.float64]]
 
     def __init__(
         self,
@@ -63,6 +68,7 @@ class Catalogue:
         epoch_mjd2000: ArrayLike,
         elements: ArrayLike,
         source: str,
+        extra: Mapping[str, ArrayLike] | None = None,
     ) -> None:
         id_column = _integers("Catalogue ids", ids)
         element_rows = np.array(elements, dtype=np.float64)
@@ -84,13 +90,15 @@ class Catalogue:
         epochs = np.broadcast_to(epochs, (n,)).copy()
         _check_orbits(epochs, element_rows)
         _check_distinct(id_column)
-        for array in (id_column, epochs, element_rows):
+        columns = {name: _extra_column(name, column, n) for name, column in (extra or {}).items()}
+        for array in (id_column, epochs, element_rows, *columns.values()):
             array.flags.writeable = False
         object.__setattr__(self, "ids", id_column)
         object.__setattr__(self, "names", tuple(str(name) for name in names))
         object.__setattr__(self, "epoch_mjd2000", epochs)
         object.__setattr__(self, "elements", element_rows)
         object.__setattr__(self, "source", source)
+        object.__setattr__(self, "extra", MappingProxyType(columns))
 
     def __len__(self) -> int:
         return len(self.ids)
@@ -101,7 +109,19 @@ class Catalogue:
     def __getstate__(self) -> dict[str, Any]:
         """Leave out what can be derived: catalogues travel to worker processes."""
         fields = self.__dataclass_fields__
-        return {name: value for name, value in self.__dict__.items() if name in fields}
+        state = {name: value for name, value in self.__dict__.items() if name in fields}
+        # A read-only view cannot be pickled.
+        return {**state, "extra": dict(self.extra)}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Take the fields over, and make what came as copies read-only again."""
+        for name, value in state.items():
+            if isinstance(value, np.ndarray):
+                value.flags.writeable = False
+            object.__setattr__(self, name, value)
+        for column in self.extra.values():
+            column.flags.writeable = False
+        object.__setattr__(self, "extra", MappingProxyType(self.extra))
 
     @property
     def period_days(self) -> NDArray[np.float64]:
@@ -234,6 +254,7 @@ class Catalogue:
             epoch_mjd2000=self.epoch_mjd2000[index],
             elements=self.elements[index],
             source=self.source,
+            extra={name: column[index] for name, column in self.extra.items()},
         )
 
     def _checked_rows(self, rows: ArrayLike) -> NDArray[np.int64]:
@@ -280,6 +301,18 @@ def _integers(what: str, values: ArrayLike) -> NDArray[np.int64]:
             f"{what}: expected integers of shape (k,), got {array.dtype} of shape {array.shape}"
         )
     return np.array(array, dtype=np.int64)
+
+
+def _extra_column(name: str, values: ArrayLike, n: int) -> NDArray[np.float64]:
+    try:
+        column = np.array(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError(f"Catalogue extra {name!r}: expected numbers") from None
+    if column.shape != (n,):
+        raise InputError(
+            f"Catalogue extra {name!r}: expected shape ({n},), one value an id, got {column.shape}"
+        )
+    return column
 
 
 def _check_distinct(ids: NDArray[np.int64]) -> None:

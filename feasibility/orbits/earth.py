@@ -19,5 +19,5 @@ def earth() -> Catalogue:
         names=["Earth"],
         epoch_mjd2000=54000.0 - MJD2000_MJD,
         elements=[[0.999988049532578 * AU, 1.671681163160e-2, *np.radians(angles_deg)]],
-        source="GTOC Earth",
+        source="the Earth",
     )

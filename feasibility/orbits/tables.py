@@ -13,11 +13,12 @@ GTOC11    id, epoch, a, e, i, node, argp, M, mass                             id
 GTOC12    id, epoch, a, e, i, node, argp, M                                   id
 ========  ==================================================================  ==============
 
-Units in the files are AU, degrees and MJD (mind that GTOC5 and GTOC7 give the
+Units in the files are AU, degrees, MJD and kg (mind that GTOC5 and GTOC7 give the
 argument of perihelion before the node). Where a layout has no name, the name is the
 id. Empty lines and lines that begin with ``#`` are skipped. The Earth, which
 GTOC2 lists after its 910 asteroids as group 5, is left out: a table is read
-for its asteroids, and `earth` has the Earth. A table of one's own is best
+for its asteroids, and `earth` has the Earth. What a layout has beside ids, names and orbits
+(group, mass) is in the catalogue's `extra` by the column's name. A table of one's own is best
 written in the GTOC12 layout::
 
     ID epoch(MJD) a(AU) e i(deg) LAN(deg) argperi(deg) M(deg)
@@ -88,6 +89,9 @@ _LAYOUTS: Final = (
     ),
 )
 
+_FURTHER: Final = ("group", "mass")
+"""Columns that are not part of the orbit: `Catalogue.extra`."""
+
 _EARTH_GROUP: Final = 5.0
 
 _RANGES: Final[dict[str, tuple[Callable[[float], bool], str]]] = {
@@ -115,7 +119,8 @@ def read_catalogue(path: str | PathLike[str]) -> Catalogue:
     Returns
     -------
     Catalogue
-        The asteroids in the order of the file; `source` is the path.
+        The asteroids in the order of the file; `source` is the path, `extra` has the
+        columns ``group`` (GTOC2) and ``mass`` in kg (GTOC11).
 
     Raises
     ------
@@ -131,6 +136,7 @@ def read_catalogue(path: str | PathLike[str]) -> Catalogue:
     ids: list[int] = []
     names: list[str] = []
     orbits: list[list[float]] = []
+    extra: dict[str, list[float]] = {column: [] for column in layout.columns if column in _FURTHER}
     line_of_id: dict[int, int] = {}
     for number, row in _rows(file, lines, start, layout):
         if row.values.get("group") == _EARTH_GROUP:
@@ -145,13 +151,17 @@ def read_catalogue(path: str | PathLike[str]) -> Catalogue:
         ids.append(identity)
         names.append(str(identity) if row.name is None else row.name)
         orbits.append([row.values[column] for column in ("epoch", *_ORBIT)])
+        for column, values in extra.items():
+            values.append(row.values[column])
     if not ids:
         raise InputError(
             f"{file}: the table is empty; expected rows of {layout.name} after the header"
         )
     table = np.array(orbits)
     elements = np.column_stack([table[:, 1] * AU, table[:, 2], np.radians(table[:, 3:])])
-    return Catalogue(ids, names, table[:, 0] - MJD2000_MJD, elements, source=str(file))
+    return Catalogue(
+        ids, names, table[:, 0] - MJD2000_MJD, elements, source=str(file), extra=extra
+    )
 
 
 def _lines(file: Path) -> list[str]:

@@ -1,10 +1,12 @@
 """Files that are either complete or absent: write to a temporary name, then rename."""
 
+import json
 import os
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 from feasibility.errors import InputError
 
@@ -45,3 +47,14 @@ def write_text(path: Path, text: str) -> None:
     """
     with atomic_path(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
+
+
+def write_json(path: Path, record: Mapping[str, Any]) -> None:
+    """Write a record of plain data as indented JSON, atomically.
+
+    Raises
+    ------
+    InputError
+        As for `atomic_path`.
+    """
+    write_text(path, json.dumps(record, indent=1) + "\n")

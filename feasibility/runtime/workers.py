@@ -1,17 +1,28 @@
-"""Pools of worker processes for long computations."""
+"""Processes and threads for long computations: pools of them, and how many."""
 
 import functools
+import math
 import multiprocessing
 import os
 import signal
 import sys
 import threading
-from collections.abc import Callable, Iterator
-from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import (
+    BrokenExecutor,
+    Executor,
+    Future,
+    ProcessPoolExecutor,
+    ThreadPoolExecutor,
+)
 from contextlib import contextmanager
-from typing import Any, Final, final
+from pathlib import Path
+from typing import Any, Final, TypeVar, final
 
 from threadpoolctl import threadpool_limits
+
+_Item = TypeVar("_Item")
+_Answer = TypeVar("_Answer")
 
 _TRIES: Final = 3
 """How often a call is begun before its workers' deaths are taken for its own doing."""
@@ -134,10 +145,42 @@ def own_threads() -> int:
 
 
 def usable_processors() -> int:
-    """Return how many processors this process may run on."""
+    """Return how many processors this process may run on: pinned or in a container, not all."""
     if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
+        return min(len(os.sched_getaffinity(0)), _container_limit())
     return os.cpu_count() or 1
+
+
+def _container_limit(file: Path = Path("/sys/fs/cgroup/cpu.max")) -> int:
+    """Return how many processors' time Linux grants a container, a large number if all."""
+    try:
+        quota, period = file.read_text(encoding="ascii").split()
+        return max(1, math.ceil(int(quota) / int(period)))
+    except (OSError, ValueError):
+        # No such limit: there is no file, or its first word is "max".
+        return sys.maxsize
+
+
+def default_workers() -> int:
+    """Return how many workers there are where the user names no number: one a processor."""
+    return usable_processors()
+
+
+def in_threads(
+    work: Callable[[_Item], _Answer], items: Iterable[_Item], threads: int
+) -> Iterator[_Answer]:
+    """Yield what `work` makes of each item, in order, with few items under way at a time."""
+    if threads == 1:
+        yield from map(work, items)
+        return
+    with ThreadPoolExecutor(threads) as pool:
+        under_way = []
+        for item in items:
+            under_way.append(pool.submit(work, item))
+            if len(under_way) > 2 * threads:
+                yield under_way.pop(0).result()
+        for future in under_way:
+            yield future.result()
 
 
 @contextmanager

@@ -1,6 +1,5 @@
 """Freshly solved legs of a spacecraft, to judge or train a model with; made anew or completed."""
 
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,7 +7,7 @@ from typing import Final, final
 
 from feasibility.dataset import Dataset, begin, read_dataset
 from feasibility.dataset.protocol import Protocol
-from feasibility.runtime.workers import worker_pool
+from feasibility.runtime.workers import default_workers, worker_pool
 from feasibility.sims_flanagan.fast.compilation import compile_kernels
 from feasibility.spacecraft.spacecraft_file import SpacecraftFile
 
@@ -80,7 +79,7 @@ def make(parts: Sequence[Part], folder: Path, workers: int | None) -> list[Datas
     generations = [begin(p.protocol, p.legs, folder / p.name, seed=p.seed) for p in parts]
     missing = sum(generation.legs_missing for generation in generations)
     if missing:
-        count = workers or os.cpu_count() or 1
+        count = workers or default_workers()
         compile_kernels()
         total = sum(part.legs for part in parts)
         # disable=None: silent where stderr is no terminal.

@@ -1,7 +1,6 @@
 """A model for one spacecraft: legs of it, fine-tuning, and the proof that it is no worse."""
 
 import dataclasses
-import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -16,8 +15,9 @@ from feasibility.dataset import Dataset, read_protocol
 from feasibility.dataset.protocol import Protocol
 from feasibility.errors import InputError
 from feasibility.evaluation.evaluate import evaluate
+from feasibility.evaluation.tables import markdown_table
 from feasibility.learning.margin.train import MarginEpoch, MarginRecipe, train_margin
-from feasibility.runtime.atomic import write_text
+from feasibility.runtime.atomic import write_json
 from feasibility.runtime.provenance import provenance
 from feasibility.spacecraft.legs import Part, make, parts_of
 from feasibility.spacecraft.spacecraft_file import LEGS_PER_SHARD, SpacecraftFile
@@ -102,20 +102,18 @@ class Retrained:
 
     def table(self) -> str:
         """Return the figures as Markdown."""
-        lines = []
+        parts = []
         for title, figures in (
             ("fresh legs of this spacecraft", self.own),
             ("fresh legs of any spacecraft", self.general),
         ):
-            lines += [f"{title}:", "", "| measure | " + " | ".join(figures) + " |"]
-            lines += ["|---" * (len(figures) + 1) + "|"]
-            for name in _SHOWN:
-                values = [candidate.get(name) for candidate in figures.values()]
-                if None not in values:
-                    shown = " | ".join(f"{value:.5f}" for value in values)
-                    lines.append(f"| {name} | {shown} |")
-            lines.append("")
-        return "\n".join(lines)
+            rows = [
+                [name, *(f"{candidate[name]:.5f}" for candidate in figures.values())]
+                for name in _SHOWN
+                if all(name in candidate for candidate in figures.values())
+            ]
+            parts.append(f"{title}:\n\n{markdown_table(['measure', *figures], rows)}\n")
+        return "\n".join(parts)
 
     def verdict(self) -> str:
         """Return in one sentence what is saved and why."""
@@ -222,7 +220,7 @@ def retrain(
         metrics={**chosen.metrics, "retrain": {"own": own[choice], "general": general[choice]}},
         provenance={**chosen.provenance, "retrain": report},
     )
-    write_text(folder / REPORT, json.dumps(report, indent=1) + "\n")
+    write_json(folder / REPORT, report)
     checkpoint.unlink(missing_ok=True)
     return Retrained(artefact, choice, own, general)
 

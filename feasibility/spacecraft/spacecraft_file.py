@@ -7,9 +7,10 @@ import msgspec
 from msgspec import Meta
 
 from feasibility.dataset.protocol import CatalogueTable, Protocol, SpacecraftTable
-from feasibility.dataset.samplers.random_pairs import RandomPairs, check_ranges
+from feasibility.dataset.samplers.draws import check_ranges
+from feasibility.dataset.samplers.random_pairs import RandomPairs
 from feasibility.dataset.samplers.search_candidates import SearchCandidates
-from feasibility.errors import InputError
+from feasibility.runtime.toml_file import read_toml
 
 _Positive = Annotated[float, Meta(gt=0)]
 _Range = tuple[_Positive, _Positive]
@@ -156,32 +157,4 @@ def read_spacecraft(path: str | Path) -> SpacecraftFile:
         The file cannot be read, is not TOML, lacks a key, has an unknown one, or a
         value of the wrong type or range; the message names file and key.
     """
-    path = Path(path)
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "not text"
-        raise InputError(
-            f"{path}: cannot be read as the TOML file of a spacecraft ({reason})"
-        ) from None
-    try:
-        return msgspec.toml.decode(text, type=SpacecraftFile, strict=False)
-    except msgspec.ValidationError as error:
-        raise InputError(f"{path}: {_readable(str(error))}") from None
-    except msgspec.DecodeError as error:
-        raise InputError(f"{path}: not valid TOML ({error})") from None
-
-
-def _readable(message: str) -> str:
-    """Rewrite msgspec's ``... - at `$.sampling` `` in the words of a TOML file."""
-    text, _, where = message.partition(" - at `$")
-    where = where.rstrip("`").lstrip(".")
-    if text.startswith("Object contains unknown field"):
-        table = Sampling if where == "sampling" else SpacecraftFile
-        place = f"in [{where}]" if where else "at top level"
-        known = ", ".join(field.name for field in msgspec.structs.fields(table))
-        return f"unknown key {text.split('`')[1]!r} {place}; known keys are {known}"
-    if text.startswith("Object missing required field"):
-        return f"no key {text.split('`')[1]!r}, which every spacecraft needs"
-    text = text[0].lower() + text[1:]
-    return f"{text} (at {where})" if where else text
+    return read_toml(Path(path), SpacecraftFile)

@@ -10,6 +10,7 @@ from typing import Any, final
 
 from feasibility.errors import InputError
 from feasibility.runtime.atomic import write_text
+from feasibility.runtime.folders import make_folder
 
 Key = dict[str, Any]
 """What a cell's value depends on: plain data, all of it."""
@@ -39,10 +40,7 @@ class Cells:
     """
 
     def __init__(self, folder: Path, say: Callable[[str], None] = print) -> None:
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise InputError(f"{folder}: cannot be created ({error.strerror})") from None
+        make_folder(folder)
         self.folder = folder
         self.say = say
         self.computed = 0

@@ -5,9 +5,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final, final
 
-import msgspec
-
 from feasibility.errors import InputError
+from feasibility.runtime.toml_file import convert_table, parse_toml, read_toml_text
 
 BASELINES: Final = ("ensemble", "knn", "svm", "tree")
 """The models that are compared with the network."""
@@ -261,10 +260,7 @@ def find_preset(name: str) -> Preset:
     path = Path(name)
     if not path.is_file():
         raise InputError(f"--preset {name}: expected one of {', '.join(PRESETS)}, or a TOML file")
-    try:
-        given = msgspec.toml.decode(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise InputError(f"{path}: not valid TOML ({error})") from None
+    given = parse_toml(read_toml_text(path), str(path))
     base = given.pop("base", "quick")
     if base not in PRESETS:
         raise InputError(f"{path}: base = {base!r}, expected one of {', '.join(PRESETS)}")
@@ -274,7 +270,4 @@ def find_preset(name: str) -> Preset:
             raise InputError(f"{path}: unknown key {key!r}; known keys are {', '.join(settings)}")
         known = settings[key]
         settings[key] = {**known, **value} if isinstance(known, dict) else value
-    try:
-        return msgspec.convert(settings, Preset, strict=False)
-    except msgspec.ValidationError as error:
-        raise InputError(f"{path}: {error}") from None
+    return convert_table(settings, Preset, str(path))

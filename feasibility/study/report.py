@@ -6,6 +6,7 @@ from typing import Any, Final
 
 from feasibility.errors import InputError
 from feasibility.runtime.atomic import atomic_path, write_text
+from feasibility.runtime.folders import make_folder
 from feasibility.study import EXPERIMENTS
 from feasibility.study.result import Result
 from feasibility.study.runner import read_record
@@ -57,10 +58,7 @@ def write_document(out: Path, document: Path) -> Path:
         if result is None:
             continue
         folder = document.with_suffix("") / name
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise InputError(f"{folder}: cannot be created ({error.strerror})") from None
+        make_folder(folder)
         for figure in result.figures:
             with atomic_path(folder / f"{figure}.png") as temporary:
                 shutil.copyfile(out / name / f"{figure}.png", temporary)

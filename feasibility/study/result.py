@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final, final
 
 from feasibility.errors import InputError
-from feasibility.runtime.atomic import atomic_path, write_text
+from feasibility.runtime.atomic import atomic_path, write_json, write_text
+from feasibility.runtime.folders import make_folder
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -127,10 +128,7 @@ class Result:
         import matplotlib as mpl
 
         folder = out / self.name
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise InputError(f"{folder}: cannot be created ({error.strerror})") from None
+        make_folder(folder)
         for table in self.tables:
             write_text(folder / f"{table.name}.csv", table.csv())
             write_text(folder / f"{table.name}.md", table.markdown())
@@ -143,7 +141,7 @@ class Result:
                     mpl.rc_context({"svg.hashsalt": name}),
                 ):
                     drawing.savefig(temporary, format=kind, dpi=130, metadata=metadata)
-        write_text(folder / _RESULT, json.dumps(asdict(self), indent=1) + "\n")
+        write_json(folder / _RESULT, asdict(self))
 
     @classmethod
     def read(cls, out: Path, name: str) -> "Result | None":

@@ -16,10 +16,11 @@ from feasibility.dataset import Dataset, begin, read_dataset, read_protocol
 from feasibility.errors import InputError
 from feasibility.learning.paper.models.dnn import find_device
 from feasibility.learning.paper.models.precision import resolve_precision
-from feasibility.runtime.atomic import write_text
+from feasibility.runtime.atomic import write_json
 from feasibility.runtime.extras import load_extra
+from feasibility.runtime.folders import make_folder
 from feasibility.runtime.provenance import provenance
-from feasibility.runtime.workers import worker_pool
+from feasibility.runtime.workers import default_workers, worker_pool
 from feasibility.study import EXPERIMENTS
 from feasibility.study.cells import Cells
 from feasibility.study.context import Context
@@ -180,7 +181,7 @@ def _dataset(settings: Settings, say: Callable[[str], None]) -> Dataset:
     shard = max(50, min(protocol.legs_per_shard, settings.preset.legs // (8 * settings.workers)))
     protocol = msgspec.structs.replace(protocol, propellant=False, legs_per_shard=shard)
     folder = settings.out / "legs"
-    _make_folder(settings.out)
+    make_folder(settings.out)
     generation = begin(protocol, settings.preset.legs, folder, seed=settings.seed)
     if generation.tasks:
         say(f"making {generation.legs_missing} legs in {folder}")
@@ -198,13 +199,6 @@ def _dataset(settings: Settings, say: Callable[[str], None]) -> Dataset:
     return read_dataset(folder)
 
 
-def _make_folder(folder: Path) -> None:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"{folder}: cannot be created ({error.strerror})") from None
-
-
 def _open_record(settings: Settings, data: StudyData) -> dict[str, Any]:
     """Return the record of the folder, begun now or before with the same settings."""
     torch = load_extra("torch")
@@ -217,7 +211,7 @@ def _open_record(settings: Settings, data: StudyData) -> dict[str, Any]:
         "fingerprint": data.fingerprint,
         "precision": precision,
     }
-    _make_folder(settings.out)
+    make_folder(settings.out)
     if (settings.out / RECORD).exists():
         record = read_record(settings.out)
         for key, value in recipe.items():
@@ -254,11 +248,11 @@ def _open_record(settings: Settings, data: StudyData) -> dict[str, Any]:
 def _threads(settings: Settings, precision: str) -> int:
     if settings.threads is not None:
         return settings.threads
-    return 1 if precision == "bfloat16" else os.cpu_count() or 1
+    return 1 if precision == "bfloat16" else default_workers()
 
 
 def _write_record(out: Path, record: dict[str, Any]) -> None:
-    write_text(out / RECORD, json.dumps(record, indent=1) + "\n")
+    write_json(out / RECORD, record)
 
 
 def machine() -> dict[str, Any]:

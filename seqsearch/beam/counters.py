@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 from typing import final
 
 from seqsearch.pruning.audit_estimate import RankAudit
+from seqsearch.pruning.hop_pruning import KeptHops
 
 
 @final
@@ -68,6 +69,11 @@ class RankCounters:
         return (
             [name for name, count in self.pruned.items() if count][-1] if self.proposed else None
         )
+
+    def count_kept(self, kept: KeptHops) -> None:
+        """Add what pruners dropped and did not know of one batch of hops."""
+        self.count_pruned(kept.pruned)
+        self.out_of_domain += kept.out_of_domain
 
     def count_pruned(self, pruned: dict[str, int]) -> None:
         """Add the counts of one batch."""

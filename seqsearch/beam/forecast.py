@@ -6,26 +6,26 @@ time, and one good answer at the curve's crossing of 1 corrects it. From there o
 times are free: the shortest that can be flown, and longer ones, which save propellant.
 """
 
-from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
-from typing import Final, TypeVar, final
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Final, final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility import Legs
-from feasibility.classifier.predictor import LegPredictor, QuickPredictor, bounded_final_mass
+from feasibility.arrays import StructOfArrays
+from feasibility.classifier.predictor import LegPredictor, bounded_final_mass
 from feasibility.orbits import OrbitalNeighbours
-from seqsearch.core.candidates import Candidates
+from feasibility.runtime.workers import in_threads
+from seqsearch.core.candidates import Candidates, Pairs, near_pairs
+from seqsearch.core.hop_margins import log_margin, quick_margin_of
+from seqsearch.core.hops import Hops
 from seqsearch.core.margin_curves import MarginCurves, flight_times
 from seqsearch.core.nodes import Nodes
-from seqsearch.core.problem import Hops, TourProblem
+from seqsearch.core.problem import Problem
 from seqsearch.settings import SearchSettings
 
 _Array = NDArray[np.float64]
-_Item = TypeVar("_Item")
-_Answer = TypeVar("_Answer")
 
 _PAIRS_AT_ONCE: Final = 10_000
 """Pairs of node and target looked at by one thread at once: bounds memory."""
@@ -40,8 +40,8 @@ _MASS_DOUBT: Final = 0.02
 
 @final
 @dataclass(frozen=True, eq=False)
-class Prospects:
-    """Targets that can probably be reached, one row a pair of node and target.
+class PairCurves(StructOfArrays):
+    """Pairs of node and target that can probably be flown, one row a pair.
 
     With n the number of pairs.
 
@@ -62,28 +62,6 @@ class Prospects:
     t_dep_mjd2000: _Array
     curves: MarginCurves
 
-    def __len__(self) -> int:
-        return len(self.parent)
-
-    def take(self, rows: NDArray[np.intp] | NDArray[np.bool_]) -> "Prospects":
-        """Return the pairs at the given rows (indices or a mask)."""
-        return Prospects(
-            self.parent[rows],
-            self.target[rows],
-            self.t_dep_mjd2000[rows],
-            self.curves.take(rows),
-        )
-
-    @staticmethod
-    def concatenate(parts: "list[Prospects]") -> "Prospects":
-        """Return the pairs of all parts, at least one, in order."""
-        return Prospects(
-            np.concatenate([part.parent for part in parts]),
-            np.concatenate([part.target for part in parts]),
-            np.concatenate([part.t_dep_mjd2000 for part in parts]),
-            MarginCurves.concatenate([part.curves for part in parts]),
-        )
-
 
 @final
 @dataclass(frozen=True, eq=False)
@@ -92,35 +70,35 @@ class Survey:
 
     Attributes
     ----------
-    longest : Candidates
-        One hop a pair, with the longest flight time: what was asked first.
+    all_pairs : Pairs
+        The n pairs that were looked at, with their longest flight times.
     hopeful : (n,) bool
-        Which of the n hops the predictor does not rule out.
-    prospects : Prospects
+        Which of them the predictor does not rule out.
+    pairs : PairCurves
         The hopeful pairs of which something is known, with their curves.
-    unknown : (k,) intp
-        Rows of `longest` of which nothing is known.
+    unknown : Pairs
+        Those of which nothing is known.
     proposed : int
         Hops that a grid of as many flight times would have proposed.
     questions : int
         Legs that the predictor was asked about.
     """
 
-    longest: Candidates
+    all_pairs: Pairs
     hopeful: NDArray[np.bool_]
-    prospects: Prospects
-    unknown: NDArray[np.intp]
+    pairs: PairCurves
+    unknown: Pairs
     proposed: int
     questions: int
 
 
 @final
 class Forecast:
-    """Asks a predictor about the ways on from nodes.
+    """Asks a predictor which hops lead on from nodes.
 
     Parameters
     ----------
-    problem : TourProblem
+    problem : Problem
         What hops there are.
     predictor : LegPredictor
         Whom to ask. A `QuickPredictor` is asked for its quick answers first.
@@ -132,7 +110,7 @@ class Forecast:
 
     def __init__(
         self,
-        problem: TourProblem,
+        problem: Problem,
         predictor: LegPredictor,
         neighbours: OrbitalNeighbours,
         threads: int = 1,
@@ -158,41 +136,39 @@ class Forecast:
             for first in range(0, len(nodes), step)
         )
 
-        def survey(pairs: tuple[NDArray[np.intp], NDArray[np.intp], _Array, _Array]) -> Survey:
-            return self._survey(nodes, *pairs, settings)
+        def survey(pairs: Pairs) -> Survey:
+            return self._survey(nodes, pairs, settings)
 
-        yield from in_threads(survey, (pairs for pairs in blocks if len(pairs[0])), self._threads)
+        yield from in_threads(survey, (pairs for pairs in blocks if len(pairs)), self._threads)
 
-    def sharpened(self, nodes: Nodes, prospects: Prospects, settings: SearchSettings) -> Prospects:
-        """Return the prospects with curves corrected by one good answer each.
+    def sharpened(self, nodes: Nodes, pairs: PairCurves, settings: SearchSettings) -> PairCurves:
+        """Return the pairs with curves corrected by one good answer each.
 
         Asked at the shortest flight time that seems flyable; pairs that turn out to
         have none are dropped.
         """
         level = np.log1p(settings.margin_reserve)
-        shortest = prospects.curves.shortest(level)
-        longest = np.exp(prospects.curves.log_last)
+        shortest = pairs.curves.shortest(level)
+        longest = np.exp(pairs.curves.log_last)
         tof = np.where(np.isfinite(shortest), shortest, longest)
 
         def ask(rows: NDArray[np.intp]) -> _Array:
-            hops = self._hops(nodes, prospects.take(rows), tof[rows])
+            hops = self._hops(nodes, pairs.take(rows), tof[rows])
             return log_margin(self._predictor.margin, hops)
 
         blocks = [
-            np.arange(first, min(first + _PAIRS_AT_ONCE // 4, len(prospects)))
-            for first in range(0, len(prospects), _PAIRS_AT_ONCE // 4)
+            np.arange(first, min(first + _PAIRS_AT_ONCE // 4, len(pairs)))
+            for first in range(0, len(pairs), _PAIRS_AT_ONCE // 4)
         ]
         answers = list(in_threads(ask, blocks, self._threads))
         if not answers:
-            return prospects
-        curves = prospects.curves.corrected(tof, np.concatenate(answers))
+            return pairs
+        curves = pairs.curves.corrected(tof, np.concatenate(answers))
         flyable = np.isfinite(curves.shortest(level))
-        return Prospects(prospects.parent, prospects.target, prospects.t_dep_mjd2000, curves).take(
-            flyable
-        )
+        return replace(pairs, curves=curves).take(flyable)
 
     def outlook(
-        self, nodes: Nodes, prospects: Prospects, settings: SearchSettings
+        self, nodes: Nodes, pairs: PairCurves, settings: SearchSettings
     ) -> tuple[Candidates, _Array, NDArray[np.intp]]:
         """Return hops with the shortest flyable flight time of each pair, and with longer ones.
 
@@ -203,10 +179,10 @@ class Forecast:
         m_final : (n,) float64, kg
             Predicted masses at arrival.
         pair : (n,) intp
-            Which of the prospects each is of.
+            Which of the pairs each is of.
         """
-        shortest = prospects.curves.shortest(np.log1p(settings.margin_reserve))
-        longest = np.exp(prospects.curves.log_last)
+        shortest = pairs.curves.shortest(np.log1p(settings.margin_reserve))
+        longest = np.exp(pairs.curves.log_last)
         pair_parts, tof_parts = [], []
         for stretch in settings.flight_time_stretches:
             tof = shortest * stretch
@@ -219,10 +195,10 @@ class Forecast:
         pair, tof_days = pair[order], tof_days[order]
 
         def mass(rows: NDArray[np.intp]) -> tuple[Hops, _Array]:
-            part = prospects.take(pair[rows])
+            part = pairs.take(pair[rows])
             hops = self._hops(nodes, part, tof_days[rows])
             margin = np.exp(part.curves.log_margin(tof_days[rows]))
-            return hops, bounded_final_mass(hops.stages[-1], margin)
+            return hops, bounded_final_mass(hops.legs[-1], margin)
 
         blocks = [
             np.arange(first, min(first + _PAIRS_AT_ONCE, len(pair)))
@@ -230,12 +206,12 @@ class Forecast:
         ]
         parts = list(in_threads(mass, blocks, self._threads))
         candidates = Candidates(
-            prospects.parent[pair],
-            prospects.target[pair],
+            pairs.parent[pair],
+            pairs.target[pair],
             Hops.concatenate([hops for hops, _ in parts]),
         )
         m_final = np.concatenate([mass for _, mass in parts])
-        last = candidates.hops.stages[-1]
+        last = candidates.hops.legs[-1]
         enough = m_final >= last.m_dry - _MASS_DOUBT * (last.m0 - m_final)
         return candidates.take(enough), m_final[enough], pair[enough]
 
@@ -245,44 +221,18 @@ class Forecast:
         flyable: NDArray[np.bool_] = np.isnan(log) | (log >= np.log1p(settings.margin_reserve))
         return flyable
 
-    def grid(self, nodes: Nodes, longest: Candidates, settings: SearchSettings) -> Candidates:
-        """Return hops with all flight times of the grid up to those of the given hops."""
-        tof = settings.tof_days()
-        pair, k = np.nonzero(tof <= longest.hops.tof_days[:, None])
-        parent, target = longest.parent[pair], longest.target[pair]
-        t_dep = longest.hops.t_dep_mjd2000[pair]
-        return Candidates(parent, target, self._problem.hops(nodes, parent, target, t_dep, tof[k]))
+    def _pairs(self, nodes: Nodes, block: NDArray[np.intp], settings: SearchSettings) -> Pairs:
+        """Return pairs with the longest flight times that are worth a question."""
+        n_near = settings.neighbours + int(nodes.depth[block].max())
+        n_near = min(n_near, len(self._problem.catalogue) - 1)
+        pairs = near_pairs(self._problem, nodes, block, self._neighbours, n_near, settings)
+        pairs = pairs.take(pairs.days_left > settings.tof_days_min)
+        return replace(pairs, days_left=np.minimum(pairs.days_left, settings.tof_days_max))
 
-    def _pairs(
-        self, nodes: Nodes, block: NDArray[np.intp], settings: SearchSettings
-    ) -> tuple[NDArray[np.intp], NDArray[np.intp], _Array, _Array]:
-        """Return parent, target, departure epoch and longest flight time of the pairs."""
-        problem = self._problem
-        depth = nodes.depth[block]
-        n_near = min(settings.neighbours + int(depth.max()), len(problem.catalogue) - 1)
-        t_ready = nodes.t_ready_mjd2000[block]
-        near = self._neighbours.query(nodes.row[block], t_ready, n_near)
-        fresh = ~(near[:, :, None] == nodes.visited[block][:, None, :]).any(axis=2)
-        departure = t_ready[:, None] + np.asarray(settings.departure_delays_days)
-        at_start = depth[:, None] == 0
-        in_window = ~at_start | (departure <= problem.first_departure_mjd2000[1])
-        clock = np.where(at_start, departure, nodes.t_first_mjd2000[block][:, None])
-        left = problem.max_duration_days - (departure - clock)
-        in_time = left > settings.tof_days_min
-        i, j, d = np.nonzero(fresh[:, :, None] & (in_window & in_time)[:, None, :])
-        longest = np.minimum(left[i, d], settings.tof_days_max)
-        return block[i], near[i, j], departure[i, d], longest
-
-    def _survey(
-        self,
-        nodes: Nodes,
-        parent: NDArray[np.intp],
-        target: NDArray[np.intp],
-        t_dep: _Array,
-        longest: _Array,
-        settings: SearchSettings,
-    ) -> Survey:
+    def _survey(self, nodes: Nodes, pairs: Pairs, settings: SearchSettings) -> Survey:
         count = settings.coarse_flight_times
+        parent, target, t_dep = pairs.parent, pairs.target, pairs.t_dep_mjd2000
+        longest = pairs.days_left
         hops = self._problem.hops(nodes, parent, target, t_dep, longest)
         at_longest = log_margin(self._quick, hops)
         unknown = np.isnan(at_longest)
@@ -308,46 +258,13 @@ class Forecast:
             np.full(len(rows), settings.tof_days_min), longest[rows], values[known]
         )
         return Survey(
-            longest=Candidates(parent, target, hops),
+            all_pairs=pairs,
             hopeful=hopeful,
-            prospects=Prospects(parent[rows], target[rows], t_dep[rows], curves),
-            unknown=np.flatnonzero(unknown),
+            pairs=PairCurves(parent[rows], target[rows], t_dep[rows], curves),
+            unknown=pairs.take(unknown),
             proposed=len(hops) * count,
-            questions=len(hops.stages) * (len(hops) + len(values) * (count - 1)),
+            questions=len(hops.legs) * (len(hops) + len(values) * (count - 1)),
         )
 
-    def _hops(self, nodes: Nodes, prospects: Prospects, tof_days: _Array) -> Hops:
-        return self._problem.hops(
-            nodes, prospects.parent, prospects.target, prospects.t_dep_mjd2000, tof_days
-        )
-
-
-def quick_margin_of(predictor: LegPredictor) -> Callable[[Legs], _Array]:
-    """Return the predictor's quick answers, or the others if it has none."""
-    if isinstance(predictor, QuickPredictor):
-        return predictor.quick_margin
-    return predictor.margin
-
-
-def log_margin(ask: Callable[[Legs], _Array], hops: Hops) -> _Array:
-    """Return (n,) log(m*/m0) of hops: that of their most difficult stage; NaN for unknown."""
-    answers = [np.log(ask(legs)) for legs in hops.stages]
-    lowest: _Array = np.min(answers, axis=0)
-    return lowest
-
-
-def in_threads(
-    work: Callable[[_Item], _Answer], items: Iterable[_Item], threads: int
-) -> Iterator[_Answer]:
-    """Yield what `work` makes of each item, in order, with few items under way at a time."""
-    if threads == 1:
-        yield from map(work, items)
-        return
-    with ThreadPoolExecutor(threads) as pool:
-        under_way = []
-        for item in items:
-            under_way.append(pool.submit(work, item))
-            if len(under_way) > 2 * threads:
-                yield under_way.pop(0).result()
-        for future in under_way:
-            yield future.result()
+    def _hops(self, nodes: Nodes, pairs: PairCurves, tof_days: _Array) -> Hops:
+        return self._problem.hops(nodes, pairs.parent, pairs.target, pairs.t_dep_mjd2000, tof_days)

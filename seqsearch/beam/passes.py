@@ -1,156 +1,114 @@
-"""Pacing: under a time limit, how long passes take and how wide their beams are.
+"""`Passes`: begins one beam after another, until a budget or their number is used up."""
 
-A first short pass gives an answer; each of the next takes three times as long, and
-the last one takes what is left. Within a pass the beam is as wide as can be afforded:
-the time left is divided by the ranks that are still to come and by what a node costs.
-"""
-
-import time
-from collections.abc import Sequence
-from typing import Final, final
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from typing import final
 
 import numpy as np
 
-from seqsearch.beam.counters import RankCounters
+from seqsearch.beam.best_tour import BestTour
+from seqsearch.beam.pacing import Pacing
+from seqsearch.beam.scouting.generations import Scouting
+from seqsearch.beam.scouting.guide import starts_of
+from seqsearch.beam.starts import Starts
+from seqsearch.beam.state import SearchState
+from seqsearch.budget import Budget
 from seqsearch.core.nodes import Nodes
-from seqsearch.core.problem import TourProblem
-from seqsearch.deadline import Deadline
-from seqsearch.settings import SearchSettings
-
-_FIRST_S: Final = 40.0
-_FIRST_SHARE: Final = 0.25
-"""The first pass takes so many seconds, but no more than this share of the limit."""
-
-_GROWTH: Final = 3.0
-_LONGEST_SCOUTED_S: Final = 120.0
-"""Passes that begin with scouting do not grow beyond this, so that little is lost by an
-interruption: what was found is in the next pass's pool."""
-_NODE_S: Final = 0.02
-"""What a node costs, as long as nothing is known: on the safe side."""
-
-_SCREEN_SHARE: Final = 0.05
-_SCREENED_LEG_S: Final = 5e-6
-"""Share of a pass that is spent on the choice of starts, and what a leg costs there."""
-
-_AUDIT_SHARE: Final = 0.1
-_AUDIT_S: Final = 2.0
-"""Share of the time that the audit may take, and what one takes."""
-
-_EPOCH_S: Final = 0.2
-"""What it takes to look at all neighbourhoods at one epoch."""
-
-_NARROWEST: Final = 60
-"""Beams narrower than this spend their time on what every rank costs, however narrow."""
-
-_RECENT: Final = 3
+from seqsearch.core.problem import Problem
 
 
 @final
-class Pacer:
-    """Chooses beam widths so that a pass ends in time.
+class Passes:
+    """Sets up the passes of a search.
 
     Parameters
     ----------
-    problem : TourProblem
-        For the longest duration of a tour.
-    deadline : Deadline
-        With a limit.
+    problem : Problem
+        What to solve.
+    count : int
+        How many passes, where no limit of the budget decides.
+    pacing : Pacing
+        How much effort each takes.
+    scouting : Scouting
+        Looks for itineraries before each.
+    starts : Starts
+        Chooses start nodes where there are no itineraries.
+    best : BestTour
+        Looks at the start nodes.
+    budget : Budget
+        Ends the search.
+    rng : numpy.random.Generator
+        Stream of the search.
     """
 
-    def __init__(self, problem: TourProblem, deadline: Deadline) -> None:
+    def __init__(
+        self,
+        problem: Problem,
+        count: int,
+        *,
+        pacing: Pacing,
+        scouting: Scouting,
+        starts: Starts,
+        best: BestTour,
+        budget: Budget,
+        rng: np.random.Generator,
+    ) -> None:
         self._problem = problem
-        self._deadline = deadline
-        self._first_s = min(_FIRST_S, _FIRST_SHARE * self._remaining_s())
-        self._end = 0.0
+        self._count = count
+        self._pacing = pacing
+        self._scouting = scouting
+        self._starts = starts
+        self._best = best
+        self._budget = budget
+        self._rng = rng
 
-    def begin_pass(self, pass_number: int, scouted: bool = False) -> None:
-        """Set the time at which a pass, one with scouts or without, shall end."""
-        remaining = self._remaining_s()
-        wanted = self._first_s * _GROWTH ** min(pass_number - 1, 20)
-        if scouted:
-            wanted = min(wanted, _LONGEST_SCOUTED_S)
-        seconds = wanted if (1.0 + _GROWTH / 2) * wanted < remaining else remaining
-        self._end = time.monotonic() + seconds
+    def begin(self, state: SearchState, report: Callable[[Nodes], None]) -> Iterator[Nodes]:
+        """Yield the nodes from which each pass goes on.
 
-    def seconds_of_pass(self) -> float:
-        """Return how much of this pass's time is left."""
-        return max(0.0, self._end - time.monotonic())
-
-    def screen_legs(self) -> int:
-        """Return how many legs can be screened for starts in this pass."""
-        return int(_SCREEN_SHARE * self.seconds_of_pass() / _SCREENED_LEG_S)
-
-    def start_epochs(self, settings: SearchSettings) -> int:
-        """Return at how many epochs there is time to look for starts."""
-        affordable = _SCREEN_SHARE * self.seconds_of_pass() / _EPOCH_S
-        return int(np.clip(affordable, min(4, settings.start_epochs), settings.start_epochs))
-
-    def width(
-        self, nodes: Nodes, settings: SearchSettings, counters: Sequence[RankCounters]
-    ) -> int:
-        """Return the beam width that can be afforded.
+        A pass that the state is in the middle of comes first.
 
         Parameters
         ----------
-        nodes : Nodes
-            Nodes that are expanded next.
-        settings : SearchSettings
-            `max_beam_width`, and what tells the number of ranks.
-        counters : sequence of RankCounters
-            All ranks so far.
+        state : SearchState
+            Gets the settings and the guide of each pass, and its start nodes in the tree.
+        report : callable
+            Told the start nodes that scouts led to: what they found is not to be lost.
         """
-        recent = [record for record in counters if record.nodes and record.rank][-_RECENT:]
-        n_nodes = sum(record.nodes for record in recent)
-        seconds = sum(record.seconds - record.seconds_audit for record in recent)
-        cost_s = seconds / n_nodes if n_nodes else _NODE_S
-        left_s = self.seconds_of_pass()
-        affordable = left_s / (max(cost_s, 1e-6) * self._ranks_left(nodes, settings))
-        return int(np.clip(affordable, _NARROWEST, settings.max_beam_width))
+        if state.waiting is not None:
+            self._set_effort(state)
+            yield state.waiting
+        while self._wanted(state) and not self._budget.used_up():
+            state.pass_number += 1
+            # What was loaded at the end of a pass still names the guide of that pass.
+            state.guide = None
+            self._set_effort(state)
+            scouted = self._scouting.guide(state, self._rng)
+            if self._budget.used_up():
+                return
+            nodes = self._planted(self._start_nodes(state), state)
+            if scouted:
+                report(nodes)
+            yield nodes
 
-    def audits(self, counters: Sequence[RankCounters]) -> bool:
-        """Tell whether there is time for an audit at the next rank."""
-        spent_s = sum(record.seconds_audit for record in counters)
-        return spent_s + _AUDIT_S < _AUDIT_SHARE * sum(record.seconds for record in counters)
+    def _wanted(self, state: SearchState) -> bool:
+        return self._budget.limited or state.pass_number < self._count
 
-    def _ranks_left(self, nodes: Nodes, settings: SearchSettings) -> float:
-        """Return about how many more legs there will be time for, at the pace so far."""
-        clock = self._problem.max_duration_days
-        if len(nodes) == 0 or nodes.depth.min() == 0:
-            return clock / (2.0 * settings.tof_days_min + self._problem.min_stay_days)
-        depth = float(nodes.depth.mean())
-        elapsed = float((nodes.t_arr_mjd2000 - nodes.t_first_mjd2000).mean())
-        return max(1.0, (clock - elapsed) / (elapsed / depth))
+    def _set_effort(self, state: SearchState) -> None:
+        state.settings = self._pacing.begin_pass(
+            state.pass_number, state.settings, state.counters, scouted=self._scouting.active
+        )
 
-    def _remaining_s(self) -> float:
-        remaining = self._deadline.remaining_s()
-        assert remaining is not None
-        return remaining
+    def _start_nodes(self, state: SearchState) -> Nodes:
+        if state.guide is not None:
+            return self._problem.start_nodes(*starts_of(state.guide))
+        return self._starts(state.settings, self._rng)
 
-
-_GAIN: Final = 8.0
-"""Measured on GTOC7: halving the weight leaves 8 % less of the propellant compared with time."""
-
-_WEIGHT_RANGE: Final = (0.05, 3.0)
-"""Least and largest weight of propellant, in units of that of time."""
-
-
-def rebalanced(settings: SearchSettings, nodes: Nodes, problem: TourProblem) -> SearchSettings:
-    """Return settings for the next pass that weigh more what ran out first.
-
-    Parameters
-    ----------
-    settings : SearchSettings
-        Those of the pass that ends.
-    nodes : Nodes
-        Its last nodes, at least one.
-    problem : TourProblem
-        What there was to use up.
-    """
-    time_left = 1.0 - (nodes.t_arr_mjd2000 - nodes.t_first_mjd2000) / problem.max_duration_days
-    mass_left = (nodes.mass - problem.spacecraft.m_dry) / (problem.m0 - problem.spacecraft.m_dry)
-    surplus = float((mass_left - time_left).mean())
-    weight = settings.propellant_weight * np.exp(-_GAIN * surplus)
-    low, high = (settings.time_weight * factor for factor in _WEIGHT_RANGE)
-    if settings.time_weight > 0 and settings.propellant_weight > 0:
-        weight = np.clip(weight, low, high)
-    return settings.with_(propellant_weight=float(weight))
+    def _planted(self, nodes: Nodes, state: SearchState) -> Nodes:
+        """Return start nodes with their ids in the tree."""
+        ids = [
+            state.tree.add_start(int(row), float(t), float(mass))
+            for row, t, mass in zip(nodes.row, nodes.t_first_mjd2000, nodes.mass, strict=True)
+        ]
+        nodes = replace(nodes, tree_id=np.asarray(ids, dtype=np.int64))
+        self._best.note(nodes, state)
+        return nodes

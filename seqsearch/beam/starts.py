@@ -1,5 +1,6 @@
 """Start nodes: bodies and epochs from which many other bodies can be reached."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Final
 
@@ -8,8 +9,10 @@ from numpy.typing import NDArray
 
 from feasibility.classifier.predictor import LegPredictor
 from feasibility.orbits import OrbitalNeighbours, orbital_metric
-from seqsearch.beam.forecast import in_threads, log_margin, quick_margin_of
-from seqsearch.core.problem import TourProblem
+from feasibility.runtime.workers import in_threads
+from seqsearch.core.hop_margins import log_margin, quick_margin_of
+from seqsearch.core.nodes import Nodes
+from seqsearch.core.problem import Problem
 from seqsearch.settings import SearchSettings
 
 _Rows = NDArray[np.intp]
@@ -27,9 +30,30 @@ _SOFT: Final = 0.3
 
 _PAIRS_AT_ONCE: Final = 300
 
+Starts = Callable[[SearchSettings, np.random.Generator], Nodes]
+"""Chooses the start nodes of a pass."""
+
+
+def make_starts(
+    problem: Problem,
+    neighbours: OrbitalNeighbours,
+    predictor: LegPredictor | None,
+    threads: int,
+) -> Starts:
+    """Return what chooses starts: the problem itself, or else what is known of legs from there."""
+    if problem.custom_moves is not None:
+        return problem.custom_moves.starts
+    if predictor is None:
+        return lambda settings, rng: problem.start_nodes(
+            *dense_starts(problem, neighbours, settings, rng)
+        )
+    return lambda settings, rng: problem.start_nodes(
+        *reachable_starts(problem, neighbours, predictor, settings, rng, threads)
+    )
+
 
 def dense_starts(
-    problem: TourProblem,
+    problem: Problem,
     neighbours: OrbitalNeighbours,
     settings: SearchSettings,
     rng: np.random.Generator,
@@ -58,7 +82,7 @@ def dense_starts(
 
 
 def reachable_starts(
-    problem: TourProblem,
+    problem: Problem,
     neighbours: OrbitalNeighbours,
     predictor: LegPredictor,
     settings: SearchSettings,
@@ -127,7 +151,7 @@ def reachable_starts(
 
 
 def _crowded(
-    problem: TourProblem,
+    problem: Problem,
     neighbours: OrbitalNeighbours,
     settings: SearchSettings,
     rng: np.random.Generator,

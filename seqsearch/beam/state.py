@@ -6,7 +6,7 @@ from typing import Any, final
 from seqsearch.beam.counters import RankCounters
 from seqsearch.beam.scouting.pool import Pool
 from seqsearch.core.nodes import Nodes
-from seqsearch.core.tree import SearchTree
+from seqsearch.core.tree import FlownLeg, SearchTree
 from seqsearch.settings import SearchSettings
 
 
@@ -39,6 +39,8 @@ class SearchState:
         Id of the best node so far; -1 before the first pass.
     best_key : tuple of (int, float)
         Its depth and the negative of its score.
+    closing : tuple of FlownLeg
+        Legs that complete the tour after the best node.
     spent_s : float
         Wall-clock time so far, over all sessions.
     solves : int
@@ -55,5 +57,6 @@ class SearchState:
     rng_state: dict[str, Any] = field(default_factory=dict)
     best_node: int = -1
     best_key: tuple[int, float] = (-1, 0.0)
+    closing: tuple[FlownLeg, ...] = ()
     spent_s: float = 0.0
     solves: int = 0

@@ -1,83 +1,52 @@
-"""What ``seqsearch resume`` does: read a run folder, check that it is whole, go on."""
+"""``seqsearch resume``: go on with a run."""
 
+import argparse
 import re
 from pathlib import Path
+from typing import TYPE_CHECKING, Final
 
 from feasibility import InputError
-from seqsearch.problems.problem_file import build_problem, read_config
-from seqsearch.pruning.pruner_spec import parse_pruner
-from seqsearch.runs.checkpoint import Checkpoints, catalogue_digest
-from seqsearch.runs.run_folder import CONFIG, RunFolder
-from seqsearch.runs.session import Budget, run_session
+from seqsearch.commands.options import add_limits, seconds
+
+if TYPE_CHECKING:
+    from seqsearch.commands.options import Commands
+
+_DESCRIPTION: Final = """\
+Go on with a run that was interrupted, killed or stopped by a limit.
+
+The run goes on after the last rank that it finished. With the same limits it ends with
+the same tour as if it had never stopped. Limits count what earlier sessions used: a run
+that has used up its limit needs a larger one.
+"""
 
 
-def resume_search(
-    run: Path,
-    *,
-    after: tuple[int, int] | None,
-    time_limit_s: float | None,
-    max_solves: int | None,
-    workers: int | None,
-) -> int:
-    """Go on with a run where it stopped, or after a rank of it, and return the exit code.
-
-    Nothing in the folder changes before everything is read and checked.
-
-    Parameters
-    ----------
-    run : Path
-        The run folder.
-    after : tuple of int, optional
-        Pass and rank after which to go on; checkpoints of later ranks are deleted.
-    time_limit_s, max_solves : optional
-        New budgets for the whole run; default: those that it was begun with.
-    workers : int, optional
-        Processes.
-
-    Raises
-    ------
-    InputError
-        No run folder, or one that is damaged, changed or of another version;
-        an asteroid table that is not the same any more; a budget that is used up.
-    """
-    checkpoints, state = Checkpoints.load(run, after)
-    origin = checkpoints.origin
-    budget = Budget(
-        time_limit_s=origin.time_limit_s if time_limit_s is None else time_limit_s,
-        max_solves=origin.max_solves if max_solves is None else max_solves,
-        workers=workers,
+def add_parser(commands: "Commands") -> None:
+    """Add the command's options."""
+    resume = commands.add_parser(
+        "resume",
+        help="go on with a run",
+        description=_DESCRIPTION,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    if budget.time_limit_s is not None and budget.time_limit_s <= state.spent_s:
-        raise InputError(
-            f"{run}: has spent {state.spent_s:.0f} s of {budget.time_limit_s:.0f} s; "
-            "expected a larger --time-limit"
-        )
-    if budget.max_solves is not None and budget.max_solves <= state.solves:
-        raise InputError(
-            f"{run}: has used {state.solves} of {budget.max_solves} solves; "
-            "expected a larger --max-solves"
-        )
-    folder = RunFolder.open(run)
-    if folder.config_digest() != origin.config_sha256:
-        raise InputError(
-            f"{run / CONFIG}: changed since the run was begun; begin another run with it"
-        )
-    config = read_config(str(run / CONFIG))
-    pruner = parse_pruner(config.search.pruner)
-    problem = build_problem(config)
-    if catalogue_digest(problem.catalogue) != origin.catalogue_sha256:
-        raise InputError(
-            f"{problem.catalogue.source}: not the asteroid table that {run} was begun with"
-        )
-    folder.note_session(budget.time_limit_s, budget.max_solves)
-    checkpoints.discard_later()
-    print(
-        f"{problem.name}: {len(problem.catalogue)} bodies from {problem.catalogue.source}, "
-        f"seed {origin.seed}, going on in {run} after pass {state.pass_number}, "
-        f"{len(state.counters)} ranks and {state.spent_s:.0f} s"
+    resume.add_argument("path", metavar="RUN", help="run folder")
+    resume.add_argument(
+        "--from-rank",
+        metavar="PASS:RANK",
+        help="go on after this rank, such as 2:5, and drop what came later; 0:0 is the beginning",
     )
-    return run_session(
-        folder, checkpoints, state, config=config, problem=problem, pruner=pruner, budget=budget
+    add_limits(resume)
+    resume.set_defaults(run=_resume)
+
+
+def _resume(options: argparse.Namespace) -> int:
+    from seqsearch.runs.resuming import resume_search
+
+    return resume_search(
+        Path(options.path),
+        after=None if options.from_rank is None else parse_rank(options.from_rank),
+        time_limit_s=seconds(options.time_limit),
+        max_solves=options.max_solves,
+        workers=options.workers,
     )
 
 

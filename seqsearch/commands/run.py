@@ -1,25 +1,81 @@
-"""What ``seqsearch run`` does: read, check, begin a run folder, search."""
+"""``seqsearch run``: read, check, begin a run folder, search."""
 
+import argparse
 from pathlib import Path
-from typing import Any
-
-import numpy as np
+from typing import TYPE_CHECKING, Any, Final
 
 from feasibility import InputError
-from seqsearch.beam.state import SearchState
-from seqsearch.commands.fleet import run_fleet
-from seqsearch.commands.polish import polish_run
-from seqsearch.problems.problem_file import (
-    Config,
-    build_problem,
-    override,
-    read_config,
-    with_catalogue,
-)
-from seqsearch.pruning.pruner_spec import parse_pruner
-from seqsearch.runs.checkpoint import Checkpoints, Origin, catalogue_digest
-from seqsearch.runs.run_folder import RunFolder
-from seqsearch.runs.session import Budget, run_session
+from seqsearch.budget import Limits
+from seqsearch.commands.options import add_limits, seconds
+
+if TYPE_CHECKING:
+    from seqsearch.commands.options import Commands
+
+_DESCRIPTION: Final = """\
+Search for the tour with the most visits and write it to a run folder.
+
+The folder gets config.toml (everything that was set), provenance.json (seed,
+versions), counters.csv (what was proposed, pruned, optimised and feasible at
+each rank), sequence.json (the tour with every impulse) and sequence.csv (its
+legs); tour.png shows it. It is rewritten after each rank: interrupt the run, or give a time
+limit, and the best tour so far is there. `seqsearch resume` goes on with it:
+checkpoints/ has what that needs. audit.json says what pruning cost: how many of the
+flyable legs it dropped, found by optimising a few of the pruned ones.
+
+The same seed gives the same tour with any number of workers, unless a time
+limit cuts the search short.
+"""
+
+
+def add_parser(commands: "Commands") -> None:
+    """Add the command's options."""
+    run = commands.add_parser(
+        "run",
+        help="search for a tour",
+        description=_DESCRIPTION,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    run.add_argument("problem", help="name of a built-in problem, or a TOML file")
+    run.add_argument("--catalogue", metavar="FILE", help="asteroid table")
+    run.add_argument("--out", metavar="DIR", help="run folder (default: runs/PROBLEM)")
+    run.add_argument("--seed", type=int, default=0, help="seed of the search (default: 0)")
+    add_limits(run)
+    run.add_argument("--beam-width", type=int, metavar="N", help="nodes kept at each rank")
+    run.add_argument("--passes", type=int, metavar="N", help="beams run one after another")
+    run.add_argument(
+        "--pruner",
+        metavar="SPEC",
+        help="such as lambert:1.3,mima2:0.97; default:RECALL or FILE.seqmodel:RECALL for a "
+        "trained model; none keeps all",
+    )
+    run.add_argument("--solver", choices=("fast", "reference"), help="leg solver")
+    run.add_argument(
+        "--polish",
+        metavar="T",
+        help="then polish the best tours for 90s, 5min (see polish)",
+    )
+    run.set_defaults(run=_run)
+
+
+def _run(options: argparse.Namespace) -> int:
+    return run_search(
+        options.problem,
+        catalogue=options.catalogue,
+        out=None if options.out is None else Path(options.out),
+        seed=options.seed,
+        limits=Limits(
+            time_limit_s=seconds(options.time_limit),
+            max_solves=options.max_solves,
+            workers=options.workers,
+        ),
+        overrides={
+            "beam_width": options.beam_width,
+            "passes": options.passes,
+            "pruner": options.pruner,
+            "solver": options.solver,
+        },
+        polish_s=seconds(options.polish, "--polish"),
+    )
 
 
 def run_search(
@@ -28,7 +84,7 @@ def run_search(
     catalogue: str | None,
     out: Path | None,
     seed: int,
-    budget: Budget,
+    limits: Limits,
     overrides: dict[str, Any],
     polish_s: float | None = None,
 ) -> int:
@@ -44,6 +100,12 @@ def run_search(
     InputError
         Anything in the input that cannot be used.
     """
+    # Imported here: the search and what it needs take a second to load.
+    from seqsearch.problems.problem_file import override, read_config, with_catalogue
+    from seqsearch.runs.begin import begin_search
+    from seqsearch.runs.fleet_run import run_fleet
+    from seqsearch.runs.polishing import polish_run
+
     if seed < 0:
         raise InputError(f"--seed {seed}: expected zero or more")
     config = override(read_config(problem_name), **overrides)
@@ -54,38 +116,8 @@ def run_search(
         config = with_catalogue(config, str(Path(config.catalogue.file).absolute()))
     folder = out or Path("runs") / config.problem.name
     if config.fleet.probes > 1:
-        return run_fleet(config, folder, seed=seed, budget=budget, search_probe=begin_search)
-    code = begin_search(config, folder, seed, budget)
+        return run_fleet(config, folder, seed=seed, limits=limits, search_probe=begin_search)
+    code = begin_search(config, folder, seed, limits)
     if code == 0 and polish_s is not None:
-        code = polish_run(folder, time_limit_s=polish_s, seed=seed, workers=budget.workers)
+        code = polish_run(folder, time_limit_s=polish_s, seed=seed, workers=limits.workers)
     return code
-
-
-def begin_search(config: Config, path: Path, seed: int, budget: Budget) -> int:
-    """Make a run folder, search with a configuration and return the exit code.
-
-    Raises
-    ------
-    InputError
-        Anything in the configuration that cannot be used, or the folder exists.
-    """
-    pruner = parse_pruner(config.search.pruner)
-    problem = build_problem(config)
-    folder = RunFolder.create(path, config, seed)
-    rng = np.random.default_rng(seed)
-    state = SearchState(settings=config.search, rng_state=dict(rng.bit_generator.state))
-    origin = Origin(
-        seed=seed,
-        time_limit_s=budget.time_limit_s,
-        max_solves=budget.max_solves,
-        config_sha256=folder.config_digest(),
-        catalogue_sha256=catalogue_digest(problem.catalogue),
-    )
-    checkpoints = Checkpoints.begin(folder.path, origin, state)
-    print(
-        f"{problem.name}: {len(problem.catalogue)} bodies from {problem.catalogue.source}, "
-        f"seed {seed}, writing to {folder.path}"
-    )
-    return run_session(
-        folder, checkpoints, state, config=config, problem=problem, pruner=pruner, budget=budget
-    )

@@ -1,4 +1,4 @@
-"""Expansion: the candidate hops that lead on from nodes."""
+"""`Candidates`: hops that might be flown, and where they would lead."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -7,9 +7,11 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
+from feasibility.arrays import StructOfArrays
 from feasibility.orbits import OrbitalNeighbours
+from seqsearch.core.hops import Hops
 from seqsearch.core.nodes import Nodes
-from seqsearch.core.problem import Hops, TourProblem
+from seqsearch.core.problem import Problem
 from seqsearch.settings import SearchSettings
 
 _CHUNK_LEGS = 200_000
@@ -18,8 +20,8 @@ _CHUNK_LEGS = 200_000
 
 @final
 @dataclass(frozen=True, eq=False)
-class Candidates:
-    """Hops proposed by the expansion, one row a hop.
+class Candidates(StructOfArrays):
+    """Hops that are not yet solved, one row a hop.
 
     With n the number of candidates.
 
@@ -37,69 +39,110 @@ class Candidates:
     target: NDArray[np.intp]
     hops: Hops
 
-    def __len__(self) -> int:
-        return len(self.parent)
 
-    def take(self, rows: NDArray[np.intp] | NDArray[np.bool_]) -> "Candidates":
-        """Return the candidates at the given rows (indices or a mask)."""
-        return Candidates(self.parent[rows], self.target[rows], self.hops.take(rows))
+@final
+@dataclass(frozen=True, eq=False)
+class Pairs(StructOfArrays):
+    """Nodes and the targets that they may go on to, one row a pair and departure epoch.
 
-    @staticmethod
-    def concatenate(parts: "list[Candidates]") -> "Candidates":
-        """Return the candidates of all parts, in order."""
-        return Candidates(
-            np.concatenate([part.parent for part in parts]),
-            np.concatenate([part.target for part in parts]),
-            Hops.concatenate([part.hops for part in parts]),
-        )
+    With n the number of pairs, ordered by node, target and epoch.
 
-
-def expand(
-    problem: TourProblem, nodes: Nodes, neighbours: OrbitalNeighbours, settings: SearchSettings
-) -> Iterator[Candidates]:
-    """Propose hops from each node: nearest bodies x departure delays x flight times.
-
-    Bodies visited before are left out, and so are arrivals beyond the
-    problem's duration and first departures outside its window. Yields blocks
-    of bounded size; together they are ordered by node, target, delay and
-    flight time.
+    Attributes
+    ----------
+    parent : (n,) intp
+        Position of the node among those that are expanded.
+    target : (n,) intp
+        Catalogue row of the target.
+    t_dep_mjd2000 : (n,) float64
+        Departure epoch.
+    days_left : (n,) float64
+        Longest time of flight that the mission has room for.
     """
-    tof = settings.tof_days()
-    delays = np.asarray(settings.departure_delays_days)
-    n_near = min(settings.neighbours + int(nodes.depth.max(initial=0)), len(problem.catalogue) - 1)
-    per_node = n_near * len(tof) * len(delays)
-    step = max(1, _CHUNK_LEGS // per_node)
-    for first in range(0, len(nodes), step):
-        block = np.arange(first, min(first + step, len(nodes)))
-        near = neighbours.query(nodes.row[block], nodes.t_ready_mjd2000[block], n_near)
-        fresh = ~(near[:, :, None] == nodes.visited[block][:, None, :]).any(axis=2)
-        departure = nodes.t_ready_mjd2000[block][:, None] + delays
-        at_start = nodes.depth[block][:, None] == 0
-        in_window = ~at_start | (departure <= problem.first_departure_mjd2000[1])
-        clock = np.where(at_start, departure, nodes.t_first_mjd2000[block][:, None])
-        in_time = (departure - clock)[:, :, None] + tof <= problem.max_duration_days
-        allowed = fresh[:, :, None, None] & (in_window[:, :, None] & in_time)[:, None]
-        i, j, d, k = np.nonzero(allowed)
-        if len(i) == 0:
-            continue
-        parent, target = block[i], near[i, j]
-        t_dep = nodes.t_ready_mjd2000[parent] + delays[d]
-        yield Candidates(parent, target, problem.hops(nodes, parent, target, t_dep, tof[k]))
+
+    parent: NDArray[np.intp]
+    target: NDArray[np.intp]
+    t_dep_mjd2000: NDArray[np.float64]
+    days_left: NDArray[np.float64]
 
 
-def reached(
-    problem: TourProblem, nodes: Nodes, candidates: Candidates, m_final: NDArray[np.float64]
-) -> Nodes:
-    """Return the n nodes to which candidate hops lead, not yet in the tree (tree_id -1).
+def near_pairs(
+    problem: Problem,
+    nodes: Nodes,
+    block: NDArray[np.intp],
+    neighbours: OrbitalNeighbours,
+    n_near: int,
+    settings: SearchSettings,
+) -> Pairs:
+    """Pair nodes with the nearest bodies and the departure delays, as far as the rules allow.
 
     Parameters
     ----------
-    problem : TourProblem
+    problem : Problem
+        Its rules.
+    nodes : Nodes
+        All nodes that are expanded.
+    block : (b,) intp
+        The nodes in question.
+    neighbours : OrbitalNeighbours
+        Which bodies are near.
+    n_near : int
+        How many of them are looked at, those included that may not be visited.
+    settings : SearchSettings
+        `departure_delays_days`; flights shorter than `tof_days_min` are not worth a pair.
+    """
+    here = nodes.take(block)
+    near = neighbours.query(here.row, here.t_ready_mjd2000, n_near)
+    departure = here.t_ready_mjd2000[:, None] + np.asarray(settings.departure_delays_days)
+    left = problem.days_left(here, departure)
+    allowed = problem.may_visit(here, near)[:, :, None] & (left >= settings.tof_days_min)[:, None]
+    i, j, d = np.nonzero(allowed)
+    return Pairs(block[i], near[i, j], departure[i, d], left[i, d])
+
+
+def on_grid(
+    problem: Problem, nodes: Nodes, pairs: Pairs, settings: SearchSettings
+) -> Candidates | None:
+    """Return the candidates of pairs at all flight times of the grid; None for none."""
+    tof = settings.tof_days()
+    pair, k = np.nonzero(tof <= pairs.days_left[:, None])
+    if len(pair) == 0:
+        return None
+    parent, target, t_dep = pairs.parent[pair], pairs.target[pair], pairs.t_dep_mjd2000[pair]
+    return Candidates(parent, target, problem.hops(nodes, parent, target, t_dep, tof[k]))
+
+
+def grid_candidates(
+    problem: Problem, nodes: Nodes, neighbours: OrbitalNeighbours, settings: SearchSettings
+) -> Iterator[Candidates]:
+    """Propose hops from each node: nearest bodies x departure delays x flight times.
+
+    Yields blocks of bounded size; together they are ordered by node, target, delay and
+    flight time.
+    """
+    n_near = min(settings.neighbours + int(nodes.depth.max(initial=0)), len(problem.catalogue) - 1)
+    per_node = n_near * len(settings.tof_days()) * len(settings.departure_delays_days)
+    step = max(1, _CHUNK_LEGS // per_node)
+    for first in range(0, len(nodes), step):
+        block = np.arange(first, min(first + step, len(nodes)))
+        pairs = near_pairs(problem, nodes, block, neighbours, n_near, settings)
+        candidates = on_grid(problem, nodes, pairs, settings)
+        if candidates is not None:
+            yield candidates
+
+
+def reached(
+    problem: Problem, nodes: Nodes, candidates: Candidates, m_final: NDArray[np.float64]
+) -> Nodes:
+    """Return the n nodes to which candidates lead, not yet in the tree (tree_id -1).
+
+    Parameters
+    ----------
+    problem : Problem
         For the stay at the target.
     nodes : Nodes
         The nodes that the candidates start from.
     candidates : Candidates
-        n hops.
+        n candidates.
     m_final : (n,) float64, kg
         Masses at arrival, before anything is dropped there.
     """

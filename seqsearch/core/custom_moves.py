@@ -1,4 +1,4 @@
-"""`OwnMoves`: what a problem has that finds its starts and moves itself."""
+"""`CustomMoves`: the starts and candidates of a problem that finds them itself."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -8,37 +8,42 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.classifier.predictor import LegPredictor
-from seqsearch.core.candidates import Candidates
+from seqsearch.core.hops import Hops
 from seqsearch.core.nodes import Nodes
-from seqsearch.core.tree import FlownLeg
 from seqsearch.settings import SearchSettings
 
 
 @final
 @dataclass(frozen=True, eq=False)
-class Proposal:
-    """Moves from nodes that a problem proposes.
+class CustomCandidates:
+    """Candidates from some nodes, shaped by the problem.
 
-    With n the number of moves.
+    With n the number of candidates, at least one.
 
     Attributes
     ----------
-    candidates : Candidates
-        The n hops.
+    parent : (n,) intp
+        Position of the node among those that are expanded.
+    target : (n,) intp
+        Catalogue row of the target.
+    hops : Hops
+        The n hops, from the parent's mass.
     m_final : (n,) float64, kg
         Predicted masses at the last arrival, before anything is dropped there.
     questions : int
         Legs that the predictor was asked about.
     """
 
-    candidates: Candidates
+    parent: NDArray[np.intp]
+    target: NDArray[np.intp]
+    hops: Hops
     m_final: NDArray[np.float64]
     questions: int
 
 
 @runtime_checkable
-class OwnMoves(Protocol):
-    """What a `TourProblem` has besides if near neighbours and a grid of times do not fit it.
+class CustomMoves(Protocol):
+    """What a `Problem` offers if near neighbours and a range of times do not fit it.
 
     A launch from a planet, say, has targets that are no neighbours of the
     planet, and a hop with a free direction in the middle is to be shaped before
@@ -49,16 +54,11 @@ class OwnMoves(Protocol):
         """Return the start nodes of a pass, not yet in the tree."""
         ...
 
-    def moves(
+    def candidates(
         self, nodes: Nodes, settings: SearchSettings, predictor: LegPredictor, threads: int, /
-    ) -> Iterator[Proposal]:
-        """Propose moves from nodes of one depth that respect the problem's limits.
+    ) -> Iterator[CustomCandidates]:
+        """Propose hops from nodes of one depth that respect the problem's limits.
 
-        Together they are ordered by node, whatever the number of threads; empty
-        proposals are left out.
+        Together they are ordered by node, whatever the number of threads.
         """
-        ...
-
-    def closing(self, row: int, t_mjd2000: float, mass: float, /) -> tuple[FlownLeg, ...]:
-        """Return legs that complete a tour after its last visit; none where none are needed."""
         ...

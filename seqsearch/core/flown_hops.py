@@ -3,71 +3,86 @@
 from dataclasses import dataclass
 from typing import final
 
+import numpy as np
+from numpy.typing import NDArray
+
 from seqsearch.core.candidates import Candidates, reached
-from seqsearch.core.nodes import Nodes
+from seqsearch.core.nodes import Nodes, no_nodes
 from seqsearch.core.optimisation import Optimised, SolvedHops
-from seqsearch.core.problem import TourProblem
+from seqsearch.core.problem import Problem
 from seqsearch.core.tree import FlownLeg
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class FlownHops:
-    """Flyable hops and the nodes that they lead to, n each.
+    """Flyable hops, the nodes to which they lead, and what it took to find them.
+
+    With n the number of flyable hops.
 
     Attributes
     ----------
-    flown : Candidates
-        The hops.
-    solved : SolvedHops
-        Their solutions.
     nodes : Nodes
-        Where they lead, not yet in the tree.
+        Where the n hops lead, not yet in the tree.
+    n_hops : int
+        Hops that were optimised, flyable or not.
+    n_legs : int
+        Legs of theirs that were given to the solver.
+    solved : tuple of (Candidates, SolvedHops) or None
+        The n hops and their solutions; None for none.
     """
 
-    flown: Candidates
-    solved: SolvedHops
     nodes: Nodes
+    n_hops: int = 0
+    n_legs: int = 0
+    solved: tuple[Candidates, SolvedHops] | None = None
+
+    @classmethod
+    def none(cls) -> "FlownHops":
+        """Return what there is where nothing was worth optimising."""
+        return cls(no_nodes())
 
     @classmethod
     def of(
-        cls, problem: TourProblem, parents: Nodes, candidates: Candidates, optimised: Optimised
+        cls, problem: Problem, parents: Nodes, candidates: Candidates, optimised: Optimised
     ) -> "FlownHops":
         """Return those of the candidates, from nodes `parents`, that were found flyable."""
-        assert optimised.solved is not None
+        found = optimised.solved
+        if found is None:
+            return cls(no_nodes(), optimised.n_hops, optimised.n_legs)
         flown = candidates.take(optimised.candidate)
-        m_final = optimised.solved.solutions[-1].m_final
-        return cls(flown, optimised.solved, reached(problem, parents, flown, m_final))
+        nodes = reached(problem, parents, flown, found.solutions[-1].m_final)
+        return cls(nodes, optimised.n_hops, optimised.n_legs, (flown, found))
 
-
-def flown_legs(
-    problem: TourProblem, flown: Candidates, solved: SolvedHops
-) -> list[tuple[FlownLeg, ...]]:
-    """Return the legs of each hop."""
-    chains: list[tuple[FlownLeg, ...]] = [() for _ in range(len(flown))]
-    stages = zip(
-        flown.hops.stages, flown.hops.dropped_kg, solved.m_star, solved.solutions, strict=True
-    )
-    for legs, dropped, m_star, solution in stages:
-        assert legs.t_dep_mjd2000 is not None
-        assert legs.dep_id is not None
-        assert legs.arr_id is not None
-        dep_row = problem.catalogue.rows_of(legs.dep_id)
-        arr_row = problem.catalogue.rows_of(legs.arr_id)
-        for i in range(len(legs)):
-            leg = FlownLeg(
-                dep_row=int(dep_row[i]),
-                arr_row=int(arr_row[i]),
-                rv_dep=legs.rv_dep[i],
-                rv_arr=legs.rv_arr[i],
-                t_dep_mjd2000=float(legs.t_dep_mjd2000[i]),
-                tof_days=float(legs.tof_days[i]),
-                m0=float(solution.m0[i]),
-                m_final=float(solution.m_final[i]),
-                m_star=float(m_star[i]),
-                dropped=float(dropped[i]),
-                throttles=solution.throttles[i],
-                mismatch=float(solution.mismatch[i]),
-            )
-            chains[i] += (leg,)
-    return chains
+    def legs(self, problem: Problem, rows: NDArray[np.intp]) -> list[tuple[FlownLeg, ...]]:
+        """Return the legs of the hops at the given positions, as the tree has them."""
+        chains: list[tuple[FlownLeg, ...]] = [() for _ in range(len(rows))]
+        if self.solved is None:
+            return chains
+        flown, solved = self.solved[0].take(rows), self.solved[1].take(rows)
+        columns = zip(
+            flown.hops.legs, flown.hops.dropped_kg, solved.m_star, solved.solutions, strict=True
+        )
+        for legs, dropped, m_star, solution in columns:
+            assert legs.t_dep_mjd2000 is not None
+            assert legs.dep_id is not None
+            assert legs.arr_id is not None
+            dep_row = problem.catalogue.rows_of(legs.dep_id)
+            arr_row = problem.catalogue.rows_of(legs.arr_id)
+            for i in range(len(legs)):
+                leg = FlownLeg(
+                    dep_row=int(dep_row[i]),
+                    arr_row=int(arr_row[i]),
+                    rv_dep=legs.rv_dep[i],
+                    rv_arr=legs.rv_arr[i],
+                    t_dep_mjd2000=float(legs.t_dep_mjd2000[i]),
+                    tof_days=float(legs.tof_days[i]),
+                    m0=float(solution.m0[i]),
+                    m_final=float(solution.m_final[i]),
+                    m_star=float(m_star[i]),
+                    dropped=float(dropped[i]),
+                    throttles=solution.throttles[i],
+                    mismatch=float(solution.mismatch[i]),
+                )
+                chains[i] += (leg,)
+        return chains

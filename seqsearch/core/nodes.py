@@ -1,16 +1,18 @@
 """`Nodes`: nodes of the search, as a struct of arrays."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, replace
 from typing import Self, final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from feasibility.arrays import StructOfArrays
+
 
 @final
 @dataclass(frozen=True, eq=False)
-class Nodes:
+class Nodes(StructOfArrays):
     """Nodes: where each spacecraft is, since when, and with what mass.
 
     With n the number of nodes and w the width of the table of visits, more
@@ -49,13 +51,6 @@ class Nodes:
     tree_id: NDArray[np.int64]
     parent_id: NDArray[np.int64]
 
-    def __len__(self) -> int:
-        return len(self.row)
-
-    def take(self, index: NDArray[np.intp] | NDArray[np.bool_]) -> Self:
-        """Return the nodes at the given positions (indices or a mask)."""
-        return type(self)(**{f.name: getattr(self, f.name)[index] for f in fields(self)})
-
     @classmethod
     def at_start(
         cls, rows: NDArray[np.intp], t_mjd2000: NDArray[np.float64], mass: NDArray[np.float64]
@@ -75,15 +70,11 @@ class Nodes:
         )
 
     @classmethod
-    def concatenate(cls, parts: "Sequence[Nodes]") -> Self:
+    def concatenate(cls, parts: "Sequence[Nodes]") -> "Nodes":
         """Return the nodes of all parts, at least one, in order."""
         width = max(part.visited.shape[1] for part in parts)
-        columns = {
-            f.name: np.concatenate([getattr(part, f.name) for part in parts])
-            for f in fields(cls)
-            if f.name != "visited"
-        }
-        return cls(**columns, visited=np.concatenate([_padded(p.visited, width) for p in parts]))
+        wide = [replace(part, visited=_padded(part.visited, width)) for part in parts]
+        return super().concatenate(wide)
 
     def extended_visits(
         self, parent: NDArray[np.intp], target: NDArray[np.intp]
@@ -99,3 +90,8 @@ class Nodes:
 def _padded(visited: NDArray[np.intp], width: int) -> NDArray[np.intp]:
     """Return a copy with columns of -1 appended."""
     return np.pad(visited, ((0, 0), (0, width - visited.shape[1])), constant_values=-1)
+
+
+def no_nodes() -> Nodes:
+    """Return an empty batch of nodes."""
+    return Nodes.at_start(np.zeros(0, dtype=np.intp), np.zeros(0), np.zeros(0))

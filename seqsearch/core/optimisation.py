@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility import LegSolutions, optimise
+from feasibility.arrays import StructOfArrays
 from feasibility.sims_flanagan import solve_max_initial_mass
 from seqsearch.core.candidates import Candidates
-from seqsearch.core.problem import Hops
+from seqsearch.core.hops import Hops
 from seqsearch.deadline import Deadline
 from seqsearch.settings import SearchSettings
 
@@ -21,7 +22,7 @@ _CHUNK = 24
 
 @final
 @dataclass(frozen=True, eq=False)
-class SolvedHops:
+class SolvedHops(StructOfArrays):
     """Solved hops, one row a hop.
 
     With n the number of hops.
@@ -29,75 +30,56 @@ class SolvedHops:
     Attributes
     ----------
     flyable : (n,) bool
-        All stages were solved.
+        All legs were solved.
     m_star : tuple of (n,) float64, kg
-        Maximum initial masses of each stage; 0 where none was found.
+        Maximum initial masses of the first legs, the second legs, and so on; 0 where none
+        was found.
     solutions : tuple of LegSolutions
-        Minimum-propellant solution of each stage; not converged where the
-        stage, or one before it, cannot be flown.
-    n_legs : int
-        Legs that were given to the solver.
+        Minimum-propellant solutions of the first legs, and so on; not converged where the
+        leg, or one before it, cannot be flown.
+    solved_legs : (n,) int64
+        Legs of each hop that were given to the solver.
     """
 
     flyable: NDArray[np.bool_]
     m_star: tuple[NDArray[np.float64], ...]
     solutions: tuple[LegSolutions, ...]
-    n_legs: int
-
-    def take(self, rows: NDArray[np.intp]) -> "SolvedHops":
-        """Return the given rows; `n_legs` stays."""
-        return SolvedHops(
-            self.flyable[rows],
-            tuple(mass[rows] for mass in self.m_star),
-            tuple(solution.take(rows) for solution in self.solutions),
-            self.n_legs,
-        )
-
-    @staticmethod
-    def concatenate(parts: "list[SolvedHops]") -> "SolvedHops":
-        """Return the hops of all parts, at least one, in order."""
-        stages = range(len(parts[0].m_star))
-        return SolvedHops(
-            np.concatenate([part.flyable for part in parts]),
-            tuple(np.concatenate([part.m_star[s] for part in parts]) for s in stages),
-            tuple(LegSolutions.concatenate([part.solutions[s] for part in parts]) for s in stages),
-            sum(part.n_legs for part in parts),
-        )
+    solved_legs: NDArray[np.int64]
 
 
 def solve_hops(hops: Hops, solver: str) -> SolvedHops:
-    """Solve a batch of hops: for each stage m*, then minimum propellant where m0 <= m*.
+    """Solve a batch of hops: for each leg m*, then minimum propellant where m0 <= m*.
 
     Parameters
     ----------
     hops : Hops
-        n hops; each stage is solved with the mass that the one before leaves.
+        n hops; each leg is solved with the mass that the one before leaves.
     solver : str
         Name of the leg solver.
     """
     flyable = np.ones(len(hops), dtype=np.bool_)
+    solved_legs = np.zeros(len(hops), dtype=np.int64)
     m_star, solutions = [], []
-    n_legs = 0
     mass: NDArray[np.float64] | None = None
-    for legs, dropped in zip(hops.stages, hops.dropped_kg, strict=True):
+    for legs, dropped in zip(hops.legs, hops.dropped_kg, strict=True):
         if mass is not None:
             flyable &= mass >= legs.m_dry
             legs = legs.with_m0(np.where(flyable, mass, np.maximum(legs.m0, legs.m_dry)))
         rows = np.flatnonzero(flyable)
-        n_legs += len(rows)
+        solved_legs[rows] += 1
         part = legs.take(rows)
         heaviest = solve_max_initial_mass(part, method=solver)
         solved = optimise(part, method=solver, guess=heaviest)
-        stage = LegSolutions.unsolved(len(legs), solved.n_segments)
+        solution = LegSolutions.unsolved(len(legs), solved.n_segments)
         for name in LegSolutions.__dataclass_fields__:
-            getattr(stage, name)[rows] = getattr(solved, name)
+            getattr(solution, name)[rows] = getattr(solved, name)
         most = np.zeros(len(legs))
         most[rows] = heaviest.m0
         m_star.append(most)
-        solutions.append(stage)
-        flyable = flyable & stage.converged
-        mass = stage.m_final - dropped
-    return SolvedHops(flyable, tuple(m_star), tuple(solutions), n_legs)
+        solutions.append(solution)
+        flyable = flyable & solution.converged
+        mass = solution.m_final - dropped
+    return SolvedHops(flyable, tuple(m_star), tuple(solutions), solved_legs)
 
 
 @final
@@ -183,7 +165,7 @@ class LegOptimiser:
             budget -= len(rows)
             converged = np.zeros(len(rows), dtype=bool)
             for chunk, solved in self._solve(candidates.hops, rows, settings.solver, deadline):
-                n_legs += solved.n_legs
+                n_legs += int(solved.solved_legs.sum())
                 n_hops += len(chunk)
                 converged[chunk] = solved.flyable
                 good = np.flatnonzero(solved.flyable)
@@ -211,7 +193,7 @@ class LegOptimiser:
         done: list[tuple[NDArray[np.intp], SolvedHops]] = []
         n_legs = n_hops = 0
         for chunk, solved in self._solve(candidates.hops, rows, settings.solver, deadline):
-            n_legs += solved.n_legs
+            n_legs += int(solved.solved_legs.sum())
             n_hops += len(chunk)
             good = np.flatnonzero(solved.flyable)
             if len(good):

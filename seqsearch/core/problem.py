@@ -1,97 +1,35 @@
-"""`TourProblem`: what the search needs to know of a problem, and `Hops`, its moves."""
+"""The `Problem` protocol: what the search needs to know of a problem."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Protocol, final, runtime_checkable
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility import Legs, Spacecraft
+from feasibility import Spacecraft
 from feasibility.orbits import Catalogue
+from seqsearch.core.custom_moves import CustomMoves
+from seqsearch.core.hops import Hops
 from seqsearch.core.nodes import Nodes
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class Hops:
-    """Ways from nodes to their next visits: chains of one or more legs.
-
-    With n the number of hops; all have the same number of stages.
-
-    Parameters
-    ----------
-    stages : tuple of Legs
-        The legs in order of flight, each n long, with departure epochs and ids
-        of bodies of the catalogue. A stage begins when the one before ends.
-        Initial masses of all stages but the first are predictions; the search
-        solves the stages in order, each with the mass that the one before left.
-    dropped_kg : tuple of (n,) float64
-        For each stage, the mass that is left behind at its end.
-    """
-
-    stages: tuple[Legs, ...]
-    dropped_kg: tuple[NDArray[np.float64], ...]
-
-    def __len__(self) -> int:
-        return len(self.stages[0])
-
-    @property
-    def t_dep_mjd2000(self) -> NDArray[np.float64]:
-        """(n,) departure epoch."""
-        return _departure(self.stages[0])
-
-    @property
-    def t_arr_mjd2000(self) -> NDArray[np.float64]:
-        """(n,) arrival epoch at the next visit."""
-        return _departure(self.stages[-1]) + self.stages[-1].tof_days
-
-    @property
-    def tof_days(self) -> NDArray[np.float64]:
-        """(n,) time of flight of all stages together."""
-        total: NDArray[np.float64] = np.sum([legs.tof_days for legs in self.stages], axis=0)
-        return total
-
-    def take(self, rows: NDArray[np.intp] | NDArray[np.bool_]) -> "Hops":
-        """Return the hops at the given rows (indices or a mask)."""
-        return Hops(
-            tuple(legs.take(rows) for legs in self.stages),
-            tuple(mass[rows] for mass in self.dropped_kg),
-        )
-
-    @staticmethod
-    def concatenate(parts: "Sequence[Hops]") -> "Hops":
-        """Return the hops of all parts, at least one, in order."""
-        return Hops(
-            tuple(
-                Legs.concatenate(list(stage))
-                for stage in zip(*(part.stages for part in parts), strict=True)
-            ),
-            tuple(
-                np.concatenate(mass)
-                for mass in zip(*(part.dropped_kg for part in parts), strict=True)
-            ),
-        )
-
-
-def _departure(legs: Legs) -> NDArray[np.float64]:
-    assert legs.t_dep_mjd2000 is not None
-    return legs.t_dep_mjd2000
+from seqsearch.core.tree import FlownLeg
+from seqsearch.settings import SearchSettings
+from seqsearch.tours.tour import TourRules
 
 
 @runtime_checkable
-class TourProblem(Protocol):
-    """A problem as the search sees it: bodies, means, limits, starts and moves.
+class Problem(Protocol):
+    """A problem as the search sees it: bodies, means, limits, starts, hops and what counts.
 
-    `Problem`, a tour of rendezvous, is one. Another competition's rules are a
-    class with the same members. With n the number of bodies of the catalogue.
+    `RendezvousProblem`, a tour of rendezvous, is one. Another competition's rules are a
+    class with the same members; `check_problem` tests it against this contract. The search
+    sends problems to worker processes, so they must be picklable. With n the number of
+    nodes, k the number of hops.
 
     Attributes
     ----------
     name : str
         Name, for reports.
     catalogue : Catalogue
-        The n bodies; also those at which a tour starts. No body is visited twice.
+        The bodies; also those at which a tour starts. No body is visited twice.
     spacecraft : Spacecraft
         Dry mass, thrust and specific impulse.
     m0 : float
@@ -104,6 +42,9 @@ class TourProblem(Protocol):
         Shortest time between an arrival and the next departure.
     start_ids : tuple of int
         Ids of the bodies at which a tour may start; empty for any.
+    custom_moves : CustomMoves or None
+        Starts and candidates of the problem's own; None where near neighbours and a range
+        of flight times fit it.
     """
 
     @property
@@ -122,13 +63,43 @@ class TourProblem(Protocol):
     def min_stay_days(self) -> float: ...  # noqa: D102
     @property
     def start_ids(self) -> tuple[int, ...]: ...  # noqa: D102
+    @property
+    def custom_moves(self) -> CustomMoves | None: ...  # noqa: D102
 
     def start_rows(self) -> NDArray[np.intp]:
         """Return the catalogue rows of the bodies at which a tour may start."""
         ...
 
     def start_nodes(self, rows: NDArray[np.intp], t_mjd2000: NDArray[np.float64], /) -> Nodes:
-        """Return the (k,) nodes that start at the given bodies and epochs."""
+        """Return the (n,) nodes that start at the given bodies and epochs."""
+        ...
+
+    def may_visit(self, nodes: Nodes, target: NDArray[np.intp], /) -> NDArray[np.bool_]:
+        """Return (n, t) whether each node may go on to each of its t targets.
+
+        Parameters
+        ----------
+        nodes : Nodes
+            n nodes.
+        target : (n, t) intp
+            Catalogue rows.
+        """
+        ...
+
+    def days_left(
+        self, nodes: Nodes, t_dep_mjd2000: NDArray[np.float64], /
+    ) -> NDArray[np.float64]:
+        """Return (n, d) the longest time of flight in days of a hop from each node.
+
+        Negative where the node may not depart at that epoch at all.
+
+        Parameters
+        ----------
+        nodes : Nodes
+            n nodes.
+        t_dep_mjd2000 : (n, d) float64
+            Departure epochs, d for each node.
+        """
         ...
 
     def hops(
@@ -142,7 +113,7 @@ class TourProblem(Protocol):
     ) -> Hops:
         """Return the (k,) hops from nodes to bodies.
 
-        All of them with the same number of stages.
+        All of them with the same number of legs.
 
         Parameters
         ----------
@@ -155,4 +126,26 @@ class TourProblem(Protocol):
         t_dep_mjd2000, tof_days : (k,) float64
             Departure epochs and whole times of flight.
         """
+        ...
+
+    def closing(self, row: int, t_mjd2000: float, mass: float, /) -> tuple[FlownLeg, ...]:
+        """Return the solved legs that complete a tour after its last visit, none for most.
+
+        Parameters
+        ----------
+        row : int
+            Catalogue row of the body visited last.
+        t_mjd2000 : float
+            Epoch of the arrival there.
+        mass : float
+            Mass in kg after it.
+        """
+        ...
+
+    def tour_cost(self, nodes: Nodes, settings: SearchSettings, /) -> NDArray[np.float64]:
+        """Return (n,) which of equally deep nodes end better tours; smaller is better."""
+        ...
+
+    def tour_rules(self) -> TourRules:
+        """Return what a tour of this problem has to respect, as its file says it."""
         ...

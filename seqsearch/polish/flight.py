@@ -8,9 +8,10 @@ from numpy.typing import NDArray
 
 from feasibility import Legs, LegSolutions, optimise
 from feasibility.sims_flanagan import solve_max_initial_mass
+from seqsearch.core.problem import Problem
+from seqsearch.core.recording import record_tour
 from seqsearch.core.tree import FlownLeg, SearchTree
 from seqsearch.polish.itinerary import Itinerary
-from seqsearch.problems.rendezvous import Problem
 from seqsearch.tours.tour import Tour
 
 _Array = NDArray[np.float64]
@@ -105,7 +106,7 @@ class Flight:
                 mismatch=float(self.solutions.mismatch[k]),
             )
             node = tree.add_hop(node, (leg,))
-        return Tour.from_tree(problem, tree, node)
+        return record_tour(problem, tree, node)
 
 
 @final

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from feasibility import Legs
-from seqsearch.problems.rendezvous import Problem
+from seqsearch.core.problem import Problem
 from seqsearch.tours.tour import Tour
 
 

@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 
 from feasibility import InputError
 from feasibility.classifier.predictor import LegPredictor
+from seqsearch.core.problem import Problem
 from seqsearch.deadline import Deadline
 from seqsearch.polish.extension import Extender, Extension, ExtensionSettings
 from seqsearch.polish.itinerary import Itinerary
 from seqsearch.polish.retiming import Retimed, retime
-from seqsearch.problems.rendezvous import Problem
 from seqsearch.tours.tour import Tour
 
 _QUICK_ITERATIONS: Final = 5

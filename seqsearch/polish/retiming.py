@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from scipy.optimize import linprog
 from scipy.sparse import coo_array
 
+from seqsearch.core.problem import Problem
 from seqsearch.polish.flight import Flight, Tangents, fly, tangents
 from seqsearch.polish.itinerary import Itinerary
-from seqsearch.problems.rendezvous import Problem
 
 _Array = NDArray[np.float64]
 

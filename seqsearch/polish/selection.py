@@ -2,8 +2,9 @@
 
 import numpy as np
 
+from seqsearch.core.problem import Problem
+from seqsearch.core.recording import record_tour
 from seqsearch.core.tree import SearchTree
-from seqsearch.problems.rendezvous import Problem
 from seqsearch.tours.tour import Tour
 
 _LARGEST_SHARE_ALIKE = 0.7
@@ -41,7 +42,7 @@ def distinct_tours(problem: Problem, tree: SearchTree, count: int) -> list[Tour]
         alike = [len(rows & other) / len(rows) for other in bodies]
         if np.max(alike, initial=0.0) > _LARGEST_SHARE_ALIKE:
             continue
-        chosen.append(Tour.from_tree(problem, tree, node))
+        chosen.append(record_tour(problem, tree, node))
         bodies.append(rows)
         if len(chosen) == count:
             break

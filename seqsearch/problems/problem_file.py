@@ -1,8 +1,8 @@
 """What a problem's TOML file may say, and how it becomes a `Problem` and `SearchSettings`."""
 
-from importlib import resources
+from functools import cache
 from pathlib import Path
-from typing import Annotated, Any, final
+from typing import Annotated, Any, Final, final
 
 import msgspec
 import numpy as np
@@ -12,11 +12,26 @@ from msgspec import Meta
 from feasibility import InputError, Spacecraft
 from feasibility.constants import mjd_to_mjd2000
 from feasibility.orbits import Catalogue, read_catalogue, synthetic_main_belt
-from seqsearch.core.problem import TourProblem
-from seqsearch.problems.gtoc5.problem import Gtoc5Problem
-from seqsearch.problems.gtoc5.rules import Gtoc5Rules
-from seqsearch.problems.rendezvous import Problem
+from feasibility.runtime.toml_file import convert_table, parse_toml, read_toml_text
+from seqsearch.core.problem import Problem
+from seqsearch.problems.registry import ProblemPlugin, builtin_problems, plugins
+from seqsearch.problems.rendezvous import RendezvousProblem
 from seqsearch.settings import SearchSettings
+
+_MOVED: Final = {
+    "frontier": ("frontier", "kind"),
+    "slice_days": ("frontier", "slice_days"),
+    "nominal_visits": ("frontier", "nominal_visits"),
+    "max_per_parent": ("frontier", "max_per_parent"),
+    "max_per_cell": ("frontier", "max_per_cell"),
+    "cell_days": ("frontier", "cell_days"),
+    "max_start_share": ("frontier", "max_start_share"),
+    "scout_generations": ("scouts", "generations"),
+    "scout_share": ("scouts", "share"),
+    "scout_width": ("scouts", "width"),
+    "audit_per_rank": ("audit", "per_rank"),
+}
+"""Keys of ``[search]`` in files of version 0.1, and where they are now."""
 
 
 class _Table(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -72,28 +87,37 @@ class FleetTable(_Table, frozen=True, kw_only=True):
     polish_share: Annotated[float, Meta(ge=0, le=0.9)] = 0.4
 
 
-@final
 class Config(_Table, frozen=True, kw_only=True):
-    """A whole problem file."""
+    """A whole problem file, but for the tables of plug-ins: those are fields of `_whole`."""
 
     problem: ProblemTable
     spacecraft: SpacecraftTable
     mission: MissionTable
     catalogue: CatalogueTable = msgspec.field(default_factory=CatalogueTable)
-    gtoc5: Gtoc5Rules | None = None
     fleet: FleetTable = msgspec.field(default_factory=FleetTable)
     search: SearchSettings = msgspec.field(default_factory=SearchSettings)
 
 
-def builtin_problems() -> dict[str, str]:
-    """Return the names of the built-in problems and their TOML texts."""
-    folders = (f for f in resources.files("seqsearch.problems").iterdir() if f.is_dir())
-    entries = [entry for folder in folders for entry in folder.iterdir()]
-    return {
-        entry.name.removesuffix(".toml"): entry.read_text(encoding="utf-8")
-        for entry in sorted(entries, key=lambda entry: entry.name)
-        if entry.name.endswith(".toml")
-    }
+@cache
+def _whole() -> type[Config]:
+    """Return the struct of problem files with a field for the rules of each plug-in."""
+    tables = [
+        (plugin.name, plugin.rules | None, None)
+        for plugin in plugins().values()
+        if plugin.rules is not None
+    ]
+    # Its bases are missing from the type hints of defstruct.
+    whole: Any = msgspec.defstruct(
+        "ProblemFile",
+        tables,
+        bases=(Config,),
+        namespace={"__doc__": "A whole problem file."},
+        frozen=True,
+        kw_only=True,
+        forbid_unknown_fields=True,
+    )
+    typed: type[Config] = whole
+    return typed
 
 
 def read_config(problem: str) -> Config:
@@ -102,7 +126,7 @@ def read_config(problem: str) -> Config:
     Parameters
     ----------
     problem : str
-        Name of a built-in problem (``gtoc5``, ``gtoc7``, ``demo``) or path of a TOML file.
+        Name of a built-in problem (see `builtin_problems`) or path of a TOML file.
 
     Raises
     ------
@@ -118,11 +142,7 @@ def read_config(problem: str) -> Config:
         raise InputError(
             f"{problem}: no such problem or file; built-in problems are {', '.join(builtin)}"
         )
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: cannot be read as a TOML file ({error})") from None
-    config = _decode(text, str(path))
+    config = _decode(read_toml_text(path), str(path))
     file = config.catalogue.file
     if file is not None and not Path(file).is_absolute():
         # A path inside a file is meant relative to that file.
@@ -132,28 +152,27 @@ def read_config(problem: str) -> Config:
 
 
 def _decode(text: str, label: str) -> Config:
-    try:
-        return msgspec.toml.decode(text, type=Config, strict=False)
-    except msgspec.ValidationError as error:
-        raise InputError(f"{label}: {_readable(str(error))}") from None
-    except msgspec.DecodeError as error:
-        raise InputError(f"{label}: not valid TOML ({error})") from None
+    plain = parse_toml(text, label)
+    if isinstance(plain.get("search"), dict):
+        plain["search"] = _upgraded(plain["search"], label)
+    return convert_table(plain, _whole(), label)
 
 
-def _readable(message: str) -> str:
-    """Rewrite msgspec's ``... - at `$.search` `` in the words of a TOML file."""
-    text, _, where = message.partition(" - at `$")
-    where = where.rstrip("`").lstrip(".")
-    if text.startswith("Object contains unknown field"):
-        key = text.split("`")[1]
-        table: Any = Config
-        if where:
-            table = {field.name: field.type for field in msgspec.structs.fields(Config)}[where]
-        known = ", ".join(field.name for field in msgspec.structs.fields(table))
-        place = f"in [{where}]" if where else "at top level"
-        return f"unknown key {key!r} {place}; known keys are {known}"
-    text = text[0].lower() + text[1:]
-    return f"{text} (at {where})" if where else text
+def _upgraded(search: dict[str, Any], label: str) -> dict[str, Any]:
+    """Return a table ``[search]`` with the keys of version 0.1 where they are now."""
+    upgraded = {
+        key: value for key, value in search.items() if key not in _MOVED or isinstance(value, dict)
+    }
+    for key in search.keys() - upgraded.keys():
+        table, name = _MOVED[key]
+        inner = dict(upgraded.get(table, {}))
+        if name in inner:
+            raise InputError(
+                f"{label}: [search] has {key!r} of version 0.1 and [search.{table}] {name!r}, "
+                "expected the second alone"
+            )
+        upgraded[table] = inner | {name: search[key]}
+    return upgraded
 
 
 def override(config: Config, **changes: Any) -> Config:
@@ -176,22 +195,30 @@ def with_catalogue(config: Config, file: str) -> Config:
     return msgspec.structs.replace(config, catalogue=table)
 
 
-def build_problem(config: Config) -> TourProblem:
+def build_problem(config: Config, catalogue: Catalogue | None = None) -> Problem:
     """Load the catalogue and build the validated problem.
 
-    A tour of rendezvous; with a table ``[gtoc5]``, a tour by its rules.
+    A tour of rendezvous; with the table of a plug-in, a tour by its rules.
+
+    Parameters
+    ----------
+    config : Config
+        The problem file.
+    catalogue : Catalogue, optional
+        Stands in for the one that the file names; the same bodies are left out.
 
     Raises
     ------
     InputError
-        The catalogue is missing or malformed, or a value is out of range.
+        The catalogue is missing or malformed, a value is out of range, or there are tables of
+        two plug-ins.
     """
     craft = config.spacecraft
     mission = config.mission
     earliest, latest = mission.first_departure_mjd
-    problem = Problem(
+    base = RendezvousProblem(
         name=config.problem.name,
-        catalogue=_load_catalogue(config),
+        catalogue=_without_excluded(catalogue or _whole_catalogue(config), config),
         spacecraft=Spacecraft(craft.dry_mass_kg, craft.thrust_n, craft.isp_s),
         m0=craft.wet_mass_kg,
         first_departure_mjd2000=(mjd_to_mjd2000(earliest), mjd_to_mjd2000(latest)),
@@ -199,7 +226,22 @@ def build_problem(config: Config) -> TourProblem:
         min_stay_days=mission.min_stay_days,
         start_ids=_start_ids(config),
     )
-    return problem if config.gtoc5 is None else Gtoc5Problem(base=problem, rules=config.gtoc5)
+    own = [
+        (plugin, rules) for plugin in plugins().values() if (rules := _rules_of(config, plugin))
+    ]
+    if len(own) > 1:
+        raise InputError(
+            f"problem {config.problem.name}: tables [{own[0][0].name}] and [{own[1][0].name}], "
+            "expected the rules of one problem"
+        )
+    for plugin, rules in own:
+        if plugin.build is not None:
+            return plugin.build(base, rules)
+    return base
+
+
+def _rules_of(config: Config, plugin: ProblemPlugin) -> object:
+    return getattr(config, plugin.name, None) if plugin.rules is not None else None
 
 
 def _start_ids(config: Config) -> tuple[int, ...]:
@@ -214,13 +256,13 @@ def _start_ids(config: Config) -> tuple[int, ...]:
     return left
 
 
-def load_problem(problem: str, catalogue: str | Path | None = None) -> TourProblem:
+def load_problem(problem: str, catalogue: str | Path | None = None) -> Problem:
     """Return a problem by name or from a TOML file, with its catalogue.
 
     Parameters
     ----------
     problem : str
-        Name of a built-in problem (``gtoc5``, ``gtoc7``, ``demo``) or path of a TOML file.
+        Name of a built-in problem (see `builtin_problems`) or path of a TOML file.
     catalogue : str or Path, optional
         Asteroid table to use instead of the one that the problem names.
 
@@ -233,8 +275,20 @@ def load_problem(problem: str, catalogue: str | Path | None = None) -> TourProbl
     return build_problem(config if catalogue is None else with_catalogue(config, str(catalogue)))
 
 
-def _load_catalogue(config: Config) -> Catalogue:
-    catalogue = _whole_catalogue(config)
+def table_at_hand(config: Config) -> Catalogue | None:
+    """Return the catalogue that a configuration names, or None where it cannot be found.
+
+    Raises
+    ------
+    InputError
+        It is there, but cannot be read.
+    """
+    file = config.catalogue.file
+    there = config.catalogue.synthetic_bodies if file is None else Path(file).is_file()
+    return _whole_catalogue(config) if there else None
+
+
+def _without_excluded(catalogue: Catalogue, config: Config) -> Catalogue:
     excluded = catalogue.rows_of(np.asarray(config.catalogue.exclude_ids, dtype=np.int64))
     kept = np.setdiff1d(np.arange(len(catalogue)), excluded)
     return catalogue.select(kept) if len(excluded) else catalogue

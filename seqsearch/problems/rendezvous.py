@@ -1,4 +1,4 @@
-"""`Problem`: everything that defines a tour, and nothing about how to find one."""
+"""`RendezvousProblem`: everything that defines a tour of rendezvous, not how to find one."""
 
 from dataclasses import dataclass
 from typing import final
@@ -9,13 +9,18 @@ from numpy.typing import NDArray
 from feasibility import InputError, Legs, Spacecraft
 from feasibility.constants import MJD2000_MJD
 from feasibility.orbits import Catalogue
+from seqsearch.core.custom_moves import CustomMoves
+from seqsearch.core.hops import Hops
+from seqsearch.core.mission import days_until_end, not_visited, used_up
 from seqsearch.core.nodes import Nodes
-from seqsearch.core.problem import Hops
+from seqsearch.core.tree import FlownLeg
+from seqsearch.settings import SearchSettings
+from seqsearch.tours.tour import TourRules
 
 
 @final
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Problem:
+class RendezvousProblem:
     """A multi-rendezvous problem: one spacecraft, many bodies, as many visits as possible.
 
     With n the number of bodies of the catalogue. The clock runs from the first
@@ -111,9 +116,26 @@ class Problem:
             return np.arange(len(self.catalogue))
         return np.asarray(self.catalogue.rows_of(np.asarray(self.start_ids)), dtype=np.intp)
 
+    @property
+    def custom_moves(self) -> CustomMoves | None:
+        """None: near neighbours and a range of flight times fit."""
+        return None
+
     def start_nodes(self, rows: NDArray[np.intp], t_mjd2000: NDArray[np.float64], /) -> Nodes:
         """Return the (k,) nodes at bodies and epochs, with full tanks."""
         return Nodes.at_start(rows, t_mjd2000, np.full(len(rows), self.m0))
+
+    def may_visit(self, nodes: Nodes, target: NDArray[np.intp], /) -> NDArray[np.bool_]:
+        """Return (n, t) whether targets, catalogue rows (n, t), were not visited before."""
+        return not_visited(nodes, target)
+
+    def days_left(
+        self, nodes: Nodes, t_dep_mjd2000: NDArray[np.float64], /
+    ) -> NDArray[np.float64]:
+        """Return (n, d) days until the longest duration is over; -inf outside the window."""
+        return days_until_end(
+            nodes, t_dep_mjd2000, self.first_departure_mjd2000[1], self.max_duration_days
+        )
 
     def hops(
         self,
@@ -124,7 +146,7 @@ class Problem:
         tof_days: NDArray[np.float64],
         /,
     ) -> Hops:
-        """Return the (k,) hops, each a single leg; see `TourProblem.hops`."""
+        """Return the (k,) hops, each a single leg; see `Problem.hops`."""
         catalogue, craft = self.catalogue, self.spacecraft
         row = nodes.row[parent]
         legs = Legs(
@@ -140,3 +162,34 @@ class Problem:
             arr_id=catalogue.ids[target],
         )
         return Hops((legs,), (np.zeros(len(legs)),))
+
+    def closing(self, row: int, t_mjd2000: float, mass: float, /) -> tuple[FlownLeg, ...]:  # noqa: ARG002
+        """Return no legs: a tour is complete after any visit."""
+        return ()
+
+    def tour_cost(self, nodes: Nodes, settings: SearchSettings, /) -> NDArray[np.float64]:
+        """Return (n,) the weighted shares of time and propellant that are used up."""
+        return used_up(
+            nodes,
+            max_duration_days=self.max_duration_days,
+            m0=self.m0,
+            m_dry=self.spacecraft.m_dry,
+            time_weight=settings.time_weight,
+            propellant_weight=settings.propellant_weight,
+        )
+
+    def tour_rules(self) -> TourRules:
+        """Return the numbers of the problem; every visited body counts one."""
+        craft = self.spacecraft
+        return TourRules(
+            name=self.name,
+            catalogue=self.catalogue.source,
+            m0_kg=self.m0,
+            m_dry_kg=craft.m_dry,
+            thrust_n=craft.thrust,
+            isp_s=craft.isp,
+            first_departure_mjd2000=self.first_departure_mjd2000,
+            max_duration_days=self.max_duration_days,
+            min_stay_days=self.min_stay_days,
+            start_ids=self.start_ids,
+        )

@@ -13,17 +13,17 @@ The audit draws from a stream of its own and changes nothing of the search.
 import copy
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final, final
+from typing import Final, Protocol, final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility import Legs
-from feasibility.classifier.predictor import LegPredictor, QuickPredictor
+from feasibility.classifier.predictor import LegPredictor
 from seqsearch.core.candidates import Candidates, reached
+from seqsearch.core.hop_margins import least_margin, quick_margin_of
 from seqsearch.core.nodes import Nodes
 from seqsearch.core.optimisation import LegOptimiser
-from seqsearch.core.problem import TourProblem
+from seqsearch.core.problem import Problem
 from seqsearch.deadline import Deadline
 from seqsearch.pruning.audit_estimate import RankAudit, Stratum
 
@@ -59,6 +59,64 @@ class _Group:
     far: bool = False
 
 
+class Sample(Protocol):
+    """What an expansion shows its candidates to: `RankSample`, or `NoSample` without an audit.
+
+    Attributes
+    ----------
+    wanted : bool
+        Whether candidates are to be shown at all; it saves making some for the sample alone.
+    """
+
+    @property
+    def wanted(self) -> bool: ...  # noqa: D102
+
+    def thin(self, n: int, of: int) -> NDArray[np.bool_]:
+        """Choose which of the next n candidates to offer, for a rank of about `of` in all."""
+        ...
+
+    def offer(self, block: Candidates, kept: NDArray[np.bool_]) -> None:
+        """Look at the next n candidates, of which (n,) `kept` were not pruned."""
+        ...
+
+    def solve(
+        self,
+        problem: Problem,
+        nodes: Nodes,
+        optimiser: LegOptimiser,
+        solver: str,
+        deadline: Deadline,
+        contends: Callable[[Nodes], NDArray[np.bool_]],
+    ) -> RankAudit | None:
+        """Optimise the sample; None where there was none, or no time for it."""
+        ...
+
+
+@final
+class NoSample:
+    """Draws nothing; a `Sample`."""
+
+    wanted = False
+
+    def thin(self, n: int, of: int) -> NDArray[np.bool_]:  # noqa: ARG002
+        """Choose none."""
+        return np.zeros(n, dtype=np.bool_)
+
+    def offer(self, block: Candidates, kept: NDArray[np.bool_]) -> None:
+        """Look away."""
+
+    def solve(
+        self,
+        problem: Problem,
+        nodes: Nodes,
+        optimiser: LegOptimiser,
+        solver: str,
+        deadline: Deadline,
+        contends: Callable[[Nodes], NDArray[np.bool_]],
+    ) -> None:
+        """Return None: nothing was audited."""
+
+
 @final
 class RankSample:
     """Draws a sample of one rank's candidates while they pass by, and solves it.
@@ -77,6 +135,8 @@ class RankSample:
     predictor : LegPredictor, optional
         Sorts candidates into strata; without it there is a single one.
     """
+
+    wanted = True
 
     def __init__(
         self,
@@ -111,7 +171,7 @@ class RankSample:
 
     def solve(
         self,
-        problem: TourProblem,
+        problem: Problem,
         nodes: Nodes,
         optimiser: LegOptimiser,
         solver: str,
@@ -183,13 +243,9 @@ class RankSample:
         strata = np.full(len(candidates), _UNKNOWN)
         if self._predictor is None:
             return strata
-        good = self._predictor.margin
-        quick = good
-        if isinstance(self._predictor, QuickPredictor):
-            quick = self._predictor.quick_margin
-        margin = _least_margin(quick, candidates)
+        margin = least_margin(quick_margin_of(self._predictor), candidates.hops)
         doubtful = np.flatnonzero(margin > _QUICK_DOUBT)
-        margin[doubtful] = _least_margin(good, candidates.take(doubtful))
+        margin[doubtful] = least_margin(self._predictor.margin, candidates.hops.take(doubtful))
         known = ~np.isnan(margin)
         strata[known] = np.searchsorted(_MARGINS, margin[known], "right")
         return strata
@@ -228,14 +284,6 @@ class _Reservoir:
         if self.candidates is not None:
             parts.insert(0, self.candidates.take(stay[stay < n_before]))
         self.candidates = Candidates.concatenate(parts)
-
-
-def _least_margin(
-    ask: Callable[[Legs], NDArray[np.float64]], candidates: Candidates
-) -> NDArray[np.float64]:
-    """Return (n,) the margin of the most difficult stage; NaN where one is unknown."""
-    least: NDArray[np.float64] = np.min([ask(legs) for legs in candidates.hops.stages], axis=0)
-    return least
 
 
 def _allot(sizes: NDArray[np.intp], solves: int) -> list[int]:

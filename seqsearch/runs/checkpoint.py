@@ -34,7 +34,7 @@ FOLDER: Final = "checkpoints"
 """Name of the folder inside a run folder."""
 
 _FORMAT: Final = "seqsearch checkpoint"
-_VERSION: Final = 2
+_VERSION: Final = 3
 _ORIGIN: Final = "origin.ckpt"
 _T = TypeVar("_T")
 
@@ -74,7 +74,8 @@ class _Node(msgspec.Struct, frozen=True, array_like=True):
 class _Rank(msgspec.Struct, frozen=True, kw_only=True):
     """What one rank added to a `SearchState`, and what replaces its other members.
 
-    `pool` is None where it is the one of the rank before.
+    `pool` is None where it is the one of the rank before; `closing` completes the tour that
+    the best node ends.
     """
 
     previous: str
@@ -88,6 +89,7 @@ class _Rank(msgspec.Struct, frozen=True, kw_only=True):
     rng_state: str
     best_node: int
     best_key: tuple[int, float]
+    closing: tuple[FlownLeg, ...]
     spent_s: float
     solves: int
 
@@ -155,6 +157,7 @@ class Checkpoints:
             rng_state=json.dumps(state.rng_state, default=_plain),
             best_node=state.best_node,
             best_key=state.best_key,
+            closing=state.closing,
             spent_s=state.spent_s,
             solves=state.solves,
         )
@@ -253,6 +256,7 @@ def _apply(rank: _Rank, state: SearchState, file: Path) -> None:
     state.rng_state = json.loads(rank.rng_state)
     state.best_node = rank.best_node
     state.best_key = rank.best_key
+    state.closing = rank.closing
     state.spent_s = rank.spent_s
     state.solves = rank.solves
 

@@ -6,11 +6,11 @@ from pathlib import Path
 from typing import Final
 
 from feasibility import InputError
-from feasibility.runtime.atomic import write_text
+from feasibility.runtime.atomic import write_json
 from feasibility.runtime.provenance import provenance
 from seqsearch.runs.run_folder import SEQUENCE
-from seqsearch.tours.tour import Tour, read_tour
-from seqsearch.tours.verify import Check
+from seqsearch.tours.checks import Check
+from seqsearch.tours.tour import Tour
 
 FLEET: Final = "fleet.json"
 """Name of the file that makes a folder a fleet's."""
@@ -50,16 +50,16 @@ def write_fleet(folder: Path, tours: list[Tour], probes: int, seed: int) -> None
         "seed": seed,
         "provenance": provenance(),
     }
-    write_text(folder / FLEET, json.dumps(record, indent=1) + "\n")
+    write_json(folder / FLEET, record)
 
 
-def read_fleet(folder: Path) -> list[Tour]:
-    """Return the tours of the probes that are done, as their own folders have them.
+def probe_paths(folder: Path) -> list[Path]:
+    """Return the tour files of the probes that are done, in their own folders.
 
     Raises
     ------
     InputError
-        ``fleet.json`` or a tour is missing or damaged.
+        ``fleet.json`` is missing or damaged.
     """
     file = folder / FLEET
     try:
@@ -67,7 +67,7 @@ def read_fleet(folder: Path) -> list[Tour]:
         names = [str(probe["folder"]) for probe in record["done"]]
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise InputError(f"{file}: cannot be read as a fleet ({error})") from None
-    return [read_tour(folder / Path(name).name / SEQUENCE) for name in names]
+    return [folder / Path(name).name / SEQUENCE for name in names]
 
 
 def check_disjoint(tours: list[Tour]) -> Check:

@@ -10,12 +10,14 @@ from pathlib import Path
 from typing import Final, Self, final
 
 from feasibility import InputError
-from feasibility.runtime.atomic import write_text
+from feasibility.runtime.atomic import write_json, write_text
+from feasibility.runtime.folders import new_folder
 from feasibility.runtime.provenance import provenance
 from seqsearch.beam.counters import RankCounters
 from seqsearch.problems.problem_file import Config, to_toml
 from seqsearch.pruning.audit_estimate import AuditEstimate
-from seqsearch.tours.tour import Tour, read_tour, to_csv, to_json
+from seqsearch.tours.tour import Tour
+from seqsearch.tours.tour_files import read_tour, to_csv, to_json
 
 CONFIG: Final = "config.toml"
 """Name of the file with everything that was set."""
@@ -51,18 +53,10 @@ class RunFolder:
         InputError
             The folder exists or cannot be created; nothing is overwritten.
         """
-        try:
-            path.mkdir(parents=True)
-        except FileExistsError:
-            raise InputError(
-                f"{path}: exists; nothing is overwritten, choose another --out or remove it"
-            ) from None
-        except OSError as error:
-            raise InputError(f"{path}: cannot be created ({error.strerror})") from None
+        new_folder(path)
         folder = cls(path)
         write_text(path / CONFIG, to_toml(config))
-        record = provenance() | {"seed": seed}
-        write_text(path / PROVENANCE, json.dumps(record, indent=1) + "\n")
+        write_json(path / PROVENANCE, provenance() | {"seed": seed})
         return folder
 
     @classmethod
@@ -106,7 +100,7 @@ class RunFolder:
         except (OSError, ValueError, AttributeError) as error:
             raise InputError(f"{file}: cannot be read ({error})") from None
         sessions.append(provenance() | {"time_limit_s": time_limit_s, "max_solves": max_solves})
-        write_text(file, json.dumps(record, indent=1) + "\n")
+        write_json(file, record)
 
     def write(self, tour: Tour, counters: Sequence[RankCounters]) -> None:
         """Write the best tour, the counters and the audit.

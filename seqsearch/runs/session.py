@@ -1,23 +1,23 @@
 """A session of a run: searches from a state on, writes the run folder, reports on screen."""
 
-import os
 import sys
 from concurrent.futures import BrokenExecutor, Executor
-from dataclasses import dataclass
 from pathlib import Path
-from typing import final
 
 import numpy as np
 
-from feasibility import AllOf, InputError, Pruner
+from feasibility import AllOf, Pruner
 from feasibility.classifier.predictor import LegPredictor
 from feasibility.pruners import PrunerContractError
-from feasibility.runtime.workers import worker_pool
+from feasibility.runtime.workers import default_workers, worker_pool
 from feasibility.sims_flanagan.fast.compilation import compile_kernels, sample_leg
-from seqsearch.beam.beam_search import SearchResult, search
+from seqsearch.beam.beam_search import search
 from seqsearch.beam.counters import RankCounters
+from seqsearch.beam.result import SearchResult
 from seqsearch.beam.state import SearchState
-from seqsearch.core.problem import TourProblem
+from seqsearch.budget import Limits
+from seqsearch.core.problem import Problem
+from seqsearch.core.recording import record_tour
 from seqsearch.problems.problem_file import Config
 from seqsearch.pruning.audit_estimate import AuditEstimate
 from seqsearch.pruning.pruner_spec import predictor_of
@@ -27,45 +27,15 @@ from seqsearch.tours.plots import plot_tour
 from seqsearch.tours.tour import Tour
 
 
-@final
-@dataclass(frozen=True, kw_only=True)
-class Budget:
-    """What a run may use, sessions before included, and how many processes work on it.
-
-    Parameters
-    ----------
-    time_limit_s : float, optional
-        Wall-clock time.
-    max_solves : int, optional
-        Full optimisations.
-    workers : int, optional
-        Processes; default: one a core.
-
-    Raises
-    ------
-    InputError
-        A number below one.
-    """
-
-    time_limit_s: float | None = None
-    max_solves: int | None = None
-    workers: int | None = None
-
-    def __post_init__(self) -> None:
-        for option, number in (("--workers", self.workers), ("--max-solves", self.max_solves)):
-            if number is not None and number < 1:
-                raise InputError(f"{option} {number}: expected one or more")
-
-
 def run_session(
     folder: RunFolder,
     checkpoints: Checkpoints,
     state: SearchState,
     *,
     config: Config,
-    problem: TourProblem,
+    problem: Problem,
     pruner: AllOf,
-    budget: Budget,
+    limits: Limits,
 ) -> int:
     """Search from a state to the end, or until a budget is used up, and return the exit code.
 
@@ -80,11 +50,11 @@ def run_session(
         # A rank that a budget cut short is repeated on resuming, so that the result is the same.
         if not state.counters[-1].cut:
             checkpoints.save(state)
-        tour = Tour.from_tree(problem, state.tree, state.best_node)
+        tour = record_tour(problem, state.tree, state.best_node, state.closing)
         folder.write(tour, state.counters)
         print(_rank_line(state.counters[-1], tour), flush=True)
 
-    workers = budget.workers or os.cpu_count() or 1
+    workers = limits.workers or default_workers()
     try:
         with worker_pool(workers) as executor:
             if config.search.solver == "fast":
@@ -97,8 +67,8 @@ def run_session(
                 rng=np.random.default_rng(checkpoints.origin.seed),
                 executor=executor,
                 threads=workers,
-                time_limit_s=budget.time_limit_s,
-                max_solves=budget.max_solves,
+                time_limit_s=limits.time_limit_s,
+                max_solves=limits.max_solves,
                 resume=state,
                 on_rank=on_rank,
             )
@@ -115,7 +85,7 @@ def run_session(
 
 def _audit_predictor(config: Config, pruner: AllOf) -> LegPredictor | None:
     """Return what sorts the audit's legs: the default model, where the pruner has none."""
-    if config.search.audit_per_rank == 0 or pruner.pruners == ():
+    if config.search.audit.per_rank == 0 or pruner.pruners == ():
         return None
     # Imported here: a search without audit and model shall not pay for the model's kernels.
     from feasibility.classifier.classifier import FeasibilityClassifier

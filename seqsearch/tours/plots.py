@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 
 from feasibility.constants import AU, DAY_S, MJD2000_MJD
 from feasibility.runtime.atomic import atomic_path
-from seqsearch.tours.tour import Tour, TourLeg
-from seqsearch.tours.verify import body_state
+from seqsearch.tours.motion import body_state
+from seqsearch.tours.records import TourLeg
+from seqsearch.tours.tour import Tour
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -8,14 +8,14 @@ import numpy as np
 from feasibility import Spacecraft
 from feasibility.constants import mjd_to_mjd2000
 from feasibility.orbits import synthetic_main_belt
-from seqsearch import Problem, SearchSettings
+from seqsearch import RendezvousProblem, SearchSettings
 
 GTOC7_TABLE = "gtoc/official/GTOC7-DATA.txt"
 
 
-def small_problem(**changes: Any) -> Problem:
+def small_problem(**changes: Any) -> RendezvousProblem:
     """Return a problem of seconds: 1500 bodies, two years."""
-    problem = Problem(
+    problem = RendezvousProblem(
         name="small",
         catalogue=synthetic_main_belt(1500, np.random.default_rng(3)),
         spacecraft=Spacecraft(m_dry=800.0, thrust=0.3, isp=3000.0),
@@ -37,4 +37,4 @@ def small_settings(**changes: Any) -> SearchSettings:
         "tof_days_step": 30.0,
         "solves_per_rank": 150,
     }
-    return SearchSettings(**(values | changes))
+    return SearchSettings().with_(**(values | changes))

@@ -49,6 +49,11 @@ class HardExamples(
         low, high = self.base.m0_kg
         return float(low), float(high)
 
+    @property
+    def draws_spacecraft(self) -> bool:
+        """Whether the base draws its own."""
+        return bool(self.base.draws_spacecraft)
+
     def draw(
         self,
         n: int,

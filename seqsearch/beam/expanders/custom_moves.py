@@ -1,21 +1,19 @@
-"""`OwnMovesExpander`: optimises what a problem with moves of its own proposes."""
+"""`CustomMovesExpander`: optimises the candidates that a problem finds itself."""
 
 import time
 from typing import Final, final
 
-from feasibility import AllOf
 from feasibility.classifier.predictor import LegPredictor
 from seqsearch.beam.counters import RankCounters
-from seqsearch.beam.expanders.forecast import Expanded, keep_hops
-from seqsearch.beam.frontiers.depth import Frontier
-from seqsearch.beam.rankings.protocol import Ranking
+from seqsearch.beam.expanders.protocol import ExpanderTools
+from seqsearch.beam.frontiers.protocol import Frontier
 from seqsearch.core.candidates import Candidates, reached
-from seqsearch.core.custom_moves import OwnMoves
+from seqsearch.core.custom_moves import CustomMoves
+from seqsearch.core.flown_hops import FlownHops
 from seqsearch.core.nodes import Nodes
-from seqsearch.core.optimisation import LegOptimiser
-from seqsearch.core.problem import TourProblem
 from seqsearch.deadline import Deadline
-from seqsearch.pruning.audit import RankSample
+from seqsearch.pruning.audit import Sample
+from seqsearch.pruning.hop_pruning import keep_hops
 from seqsearch.settings import SearchSettings
 
 _SOLVED: Final = 2.0
@@ -23,44 +21,23 @@ _SOLVED: Final = 2.0
 
 
 @final
-class OwnMovesExpander:
-    """Optimises the proposals of a problem that seem to go on; an `Expander`.
+class CustomMovesExpander:
+    """Optimises those candidates of a problem that seem to go on; an `Expander`.
 
     Parameters
     ----------
-    problem : TourProblem
-        For the nodes that are reached.
-    moves : OwnMoves
-        The same problem, as it proposes.
+    tools : ExpanderTools
+        What it works with.
+    moves : CustomMoves
+        Finds the candidates.
     predictor : LegPredictor
-        Whom the problem may ask.
-    pruner : AllOf
-        What survives of the proposals.
-    ranking : Ranking
-        What is optimised first.
-    optimiser : LegOptimiser
-        How it is optimised.
-    threads : int
-        Threads in which the problem may ask.
+        Predicts margins and masses for the problem.
     """
 
-    def __init__(
-        self,
-        problem: TourProblem,
-        moves: OwnMoves,
-        predictor: LegPredictor,
-        pruner: AllOf,
-        ranking: Ranking,
-        optimiser: LegOptimiser,
-        threads: int,
-    ) -> None:
-        self._problem = problem
+    def __init__(self, tools: ExpanderTools, moves: CustomMoves, predictor: LegPredictor) -> None:
+        self._tools = tools
         self._moves = moves
         self._predictor = predictor
-        self._pruner = pruner
-        self._ranking = ranking
-        self._optimiser = optimiser
-        self._threads = threads
 
     def expand(
         self,
@@ -68,36 +45,50 @@ class OwnMovesExpander:
         frontier: Frontier,
         settings: SearchSettings,
         counters: RankCounters,
-        sample: RankSample | None,
+        sample: Sample,
         deadline: Deadline,
-    ) -> Expanded | None:
-        """Return the hops found; None where nothing was worth optimising."""
+    ) -> FlownHops:
+        """Return the flyable hops found and what it took."""
+        tools = self._tools
+        parts = self._candidates(nodes, settings, counters, deadline)
+        if not parts or deadline.passed():
+            return FlownHops.none()
         clock = time.perf_counter()
-        candidates, found = [], []
-        for proposal in self._moves.moves(nodes, settings, self._predictor, self._threads):
-            counters.proposed += len(proposal.candidates)
-            counters.questions += proposal.questions
-            candidates.append(proposal.candidates)
-            found.append(reached(self._problem, nodes, proposal.candidates, proposal.m_final))
-            if deadline.passed():
-                return None
-        counters.seconds_expand += time.perf_counter() - clock
-        if not candidates:
-            return None
-        clock = time.perf_counter()
-        reachable = Nodes.concatenate(found)
-        chosen = frontier.admit(reachable, _SOLVED)
-        best = Candidates.concatenate(candidates).take(chosen)
-        counters.count_pruned({"predictor": len(reachable) - len(chosen)})
-        mask = keep_hops(self._pruner, best.hops, counters)
-        if sample is not None:
-            sample.offer(best, mask)
-        best, reachable = best.take(mask), reachable.take(chosen).take(mask)
+        found = Nodes.concatenate([nodes for _, nodes in parts])
+        chosen = frontier.admit(found, settings.beam_width, _SOLVED)
+        best = Candidates.concatenate([candidates for candidates, _ in parts]).take(chosen)
+        counters.count_pruned({"predictor": len(found) - len(chosen)})
+        survivors = keep_hops(tools.pruner, best.hops)
+        counters.count_kept(survivors)
+        sample.offer(best, survivors.mask)
+        best, found = best.take(survivors.mask), found.take(chosen).take(survivors.mask)
         counters.seconds_prune += time.perf_counter() - clock
         if len(best) == 0 or deadline.passed():
-            return None
+            return FlownHops.none()
         clock = time.perf_counter()
-        promise = self._ranking.score(reachable, self._problem)
-        optimised = self._optimiser.run_all(best, promise, settings, deadline)
+        promise = tools.ranking.score(found, tools.problem)
+        optimised = tools.optimiser.run_all(best, promise, settings, deadline)
         counters.seconds_optimise = time.perf_counter() - clock
-        return Expanded(best, optimised)
+        return FlownHops.of(tools.problem, nodes, best, optimised)
+
+    def _candidates(
+        self,
+        nodes: Nodes,
+        settings: SearchSettings,
+        counters: RankCounters,
+        deadline: Deadline,
+    ) -> list[tuple[Candidates, Nodes]]:
+        """Return candidates and the nodes to which they seem to lead, in parts."""
+        parts = []
+        clock = time.perf_counter()
+        for part in self._moves.candidates(nodes, settings, self._predictor, self._tools.threads):
+            candidates = Candidates(part.parent, part.target, part.hops)
+            counters.proposed += len(candidates)
+            counters.questions += part.questions
+            parts.append(
+                (candidates, reached(self._tools.problem, nodes, candidates, part.m_final))
+            )
+            if deadline.passed():
+                break
+        counters.seconds_expand += time.perf_counter() - clock
+        return parts

@@ -4,13 +4,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seqsearch.core.nodes import Nodes
-from seqsearch.settings import SearchSettings
+from seqsearch.settings import FrontierSettings
 
 
 def select(
     scores: NDArray[np.float64],
     nodes: Nodes,
-    settings: SearchSettings,
+    settings: FrontierSettings,
+    width: int,
     spare: float = 1.0,
 ) -> NDArray[np.intp]:
     """Return the positions of the nodes that go on, best first.
@@ -29,25 +30,27 @@ def select(
         Smaller is better.
     nodes : Nodes
         The n nodes.
-    settings : SearchSettings
-        `beam_width` and the caps.
+    settings : FrontierSettings
+        The caps.
+    width : int
+        Beam width.
     spare : float
-        Factor on `beam_width`, `max_per_parent` and `max_per_cell`, rounded up.
+        Factor on the width and the caps, rounded up.
 
     Returns
     -------
     (k,) intp
-        At most `beam_width` times `spare` positions.
+        At most `width` times `spare` positions.
     """
     start = _numbered(nodes.visited[:, :1])
     share = max(settings.max_start_share, 1.0 / (1 + start.max(initial=0)))
     caps = (
-        settings.beam_width,
+        width,
         settings.max_per_parent,
         settings.max_per_cell,
-        settings.beam_width * share,
+        width * share,
     )
-    width, per_parent, per_cell, per_start = (int(np.ceil(cap * spare)) for cap in caps)
+    most, per_parent, per_cell, per_start = (int(np.ceil(cap * spare)) for cap in caps)
     # Cells, and sets of bodies, become numbers once; the walk itself is over plain integers.
     epoch = np.floor(nodes.t_arr_mjd2000 / settings.cell_days).astype(np.int64)
     cell = _numbered(np.column_stack([nodes.row, epoch]))
@@ -77,7 +80,7 @@ def select(
         of_kind[k] += 1
         of_start[s] += 1
         taken.append(i)
-        if len(taken) == width:
+        if len(taken) == most:
             break
     return np.asarray(taken, dtype=np.intp)
 

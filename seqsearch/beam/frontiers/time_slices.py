@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from seqsearch.beam.frontiers.selection import select
 from seqsearch.beam.rankings.protocol import Ranking
-from seqsearch.core.nodes import Nodes
-from seqsearch.core.problem import TourProblem
+from seqsearch.core.nodes import Nodes, no_nodes
+from seqsearch.core.problem import Problem
 from seqsearch.settings import SearchSettings
 
 _STARTS = -1
@@ -30,20 +30,21 @@ class TimeSliceFrontier:
     Parameters
     ----------
     settings : SearchSettings
-        `slice_days`, `nominal_visits`, beam width (for each slice) and the caps of `select`.
-    problem : TourProblem
+        The weights, and the table of the frontier: `slice_days`, `nominal_visits` and the
+        caps of `select`. The beam width is for each slice.
+    problem : Problem
         For the ranking.
     ranking : Ranking
         Scores what has been used up.
     """
 
-    def __init__(self, settings: SearchSettings, problem: TourProblem, ranking: Ranking) -> None:
+    def __init__(self, settings: SearchSettings, problem: Problem, ranking: Ranking) -> None:
         self._settings = settings
         self._problem = problem
         self._ranking = ranking
         self._slices: dict[int, Nodes] = {}
 
-    def admit(self, nodes: Nodes, /, spare: float = 1.0) -> NDArray[np.intp]:
+    def admit(self, nodes: Nodes, /, width: int, spare: float = 1.0) -> NDArray[np.intp]:
         """Return the positions of the nodes that are among the best of their slice."""
         admitted: list[NDArray[np.intp]] = []
         for number, positions in self._by_slice(nodes):
@@ -51,7 +52,7 @@ class TimeSliceFrontier:
             waiting = self._slices.get(number)
             if waiting is not None:
                 rivals = Nodes.concatenate([rivals, waiting])
-            chosen = self._best(rivals, spare)
+            chosen = self._best(rivals, width, spare)
             admitted.append(positions[chosen[chosen < len(positions)]])
         return np.concatenate(admitted) if admitted else np.zeros(0, dtype=np.intp)
 
@@ -63,25 +64,24 @@ class TimeSliceFrontier:
                 parts.insert(0, self._slices[number])
             self._slices[number] = Nodes.concatenate(parts)
 
-    def pop(self) -> Nodes:
+    def pop(self, width: int) -> Nodes:
         """Return the best nodes of the earliest slice; those beyond the beam width are dropped."""
         if not self._slices:
-            empty = np.zeros(0)
-            return Nodes.at_start(empty.astype(np.intp), empty, empty)
+            return no_nodes()
         number = min(self._slices)
         nodes = self._slices.pop(number)
-        return nodes if number == _STARTS else nodes.take(self._best(nodes))
+        return nodes if number == _STARTS else nodes.take(self._best(nodes, width))
 
-    def waiting(self) -> Nodes | None:
+    def waiting(self) -> Nodes:
         """Return the nodes of all slices, earliest slice first."""
         if not self._slices:
-            return None
+            return no_nodes()
         return Nodes.concatenate([self._slices[number] for number in sorted(self._slices)])
 
-    def _best(self, nodes: Nodes, spare: float = 1.0) -> NDArray[np.intp]:
-        progress = nodes.depth / self._settings.nominal_visits
+    def _best(self, nodes: Nodes, width: int, spare: float = 1.0) -> NDArray[np.intp]:
+        progress = nodes.depth / self._settings.frontier.nominal_visits
         scores = self._ranking.score(nodes, self._problem) - progress * self._worth_of_a_tour()
-        return select(scores, nodes, self._settings, spare)
+        return select(scores, nodes, self._settings.frontier, width, spare)
 
     def _worth_of_a_tour(self) -> float:
         """Return the score of a tour that used up everything."""
@@ -89,6 +89,6 @@ class TimeSliceFrontier:
 
     def _by_slice(self, nodes: Nodes) -> list[tuple[int, NDArray[np.intp]]]:
         elapsed = nodes.t_arr_mjd2000 - nodes.t_first_mjd2000
-        slices = np.floor(elapsed / self._settings.slice_days).astype(np.int64)
+        slices = np.floor(elapsed / self._settings.frontier.slice_days).astype(np.int64)
         slices[nodes.depth == 0] = _STARTS
         return [(int(number), np.flatnonzero(slices == number)) for number in np.unique(slices)]

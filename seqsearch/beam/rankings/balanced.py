@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seqsearch.core.nodes import Nodes
-from seqsearch.core.problem import TourProblem
+from seqsearch.core.problem import Problem
 
 _LEAST: Final = 1e-6
 """Shares are held above this: nothing left is worth as much as almost nothing."""
@@ -35,7 +35,7 @@ class BalancedRanking:
     time_weight: float = 1.0
     propellant_weight: float = 0.6
 
-    def score(self, nodes: Nodes, problem: TourProblem, /) -> NDArray[np.float64]:
+    def score(self, nodes: Nodes, problem: Problem, /) -> NDArray[np.float64]:
         """Return (n,) float64, smaller is better."""
         elapsed = nodes.t_arr_mjd2000 - nodes.t_first_mjd2000
         time = np.maximum(1.0 - elapsed / problem.max_duration_days, _LEAST)

@@ -6,7 +6,8 @@ from feasibility.orbits import OrbitalNeighbours
 from seqsearch.beam.rankings.balanced import BalancedRanking
 from seqsearch.beam.rankings.pareto import ParetoRanking
 from seqsearch.beam.rankings.potential import PotentialRanking
-from seqsearch.beam.rankings.protocol import Ranking, TimePropellantRanking
+from seqsearch.beam.rankings.protocol import Ranking
+from seqsearch.beam.rankings.time_propellant import TimePropellantRanking
 from seqsearch.settings import SearchSettings
 
 

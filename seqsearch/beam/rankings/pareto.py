@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from seqsearch.beam.rankings.protocol import Ranking
 from seqsearch.core.nodes import Nodes
-from seqsearch.core.problem import TourProblem
+from seqsearch.core.problem import Problem
 
 
 @final
@@ -28,7 +28,7 @@ class ParetoRanking:
 
     within: Ranking
 
-    def score(self, nodes: Nodes, problem: TourProblem, /) -> NDArray[np.float64]:
+    def score(self, nodes: Nodes, problem: Problem, /) -> NDArray[np.float64]:
         """Return (n,) float64: number of the front from 0, plus less than 1 from `within`."""
         elapsed = nodes.t_arr_mjd2000 - nodes.t_first_mjd2000
         inner = self.within.score(nodes, problem)

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 from feasibility.classifier.predictor import LegPredictor
 from feasibility.orbits import OrbitalNeighbours
 from seqsearch.beam.rankings.protocol import Ranking
+from seqsearch.core.hop_margins import least_margin
 from seqsearch.core.nodes import Nodes
-from seqsearch.core.problem import TourProblem
+from seqsearch.core.problem import Problem
 
 _TOF_DAYS: Final = (80.0, 120.0, 160.0)
 """Flight times that are asked about: those of legs worth having on a tour of the main belt."""
@@ -22,7 +23,7 @@ _CELL_MASS: Final = 0.04
 
 @final
 class PotentialRanking:
-    """Adds to another ranking a penalty for nodes with few ways on.
+    """Adds to another ranking a penalty for nodes from which few targets can be reached.
 
     The predictor is asked for the legs from the node's body to its nearest
     bodies. The answer is shared by all nodes at the same body, within the same
@@ -58,12 +59,12 @@ class PotentialRanking:
         self._n_near = n_near
         self._known: dict[tuple[int, int, int], float] = {}
 
-    def score(self, nodes: Nodes, problem: TourProblem, /) -> NDArray[np.float64]:
+    def score(self, nodes: Nodes, problem: Problem, /) -> NDArray[np.float64]:
         """Return (n,) float64, smaller is better."""
         penalty = self._weight * (1.0 - self.potential(nodes, problem))
         return self._base.score(nodes, problem) + penalty
 
-    def potential(self, nodes: Nodes, problem: TourProblem, /) -> NDArray[np.float64]:
+    def potential(self, nodes: Nodes, problem: Problem, /) -> NDArray[np.float64]:
         """Return (n,) float64, 0 to 1: share of the near bodies that can be reached, soonest most.
 
         A body that can be reached at the shortest of the flight times asked about
@@ -84,7 +85,7 @@ class PotentialRanking:
             self._known.update(zip(unknown, found.tolist(), strict=True))
         return np.array([self._known[cell] for cell in cells])
 
-    def _ask(self, cells: NDArray[np.int64], problem: TourProblem) -> NDArray[np.float64]:
+    def _ask(self, cells: NDArray[np.int64], problem: Problem) -> NDArray[np.float64]:
         """Return the potential at the centres of cells."""
         n = len(cells)
         rows = cells[:, 0].astype(np.intp)
@@ -103,7 +104,7 @@ class PotentialRanking:
         tofs = np.array(_TOF_DAYS)
         i, j, k = (index.ravel() for index in np.indices((n, n_near, len(tofs))))
         hops = problem.hops(nodes, i, near[i, j], epoch[i], tofs[k])
-        margin = np.min([self._predictor.margin(legs) for legs in hops.stages], axis=0)
+        margin = least_margin(self._predictor.margin, hops)
         flyable = (np.nan_to_num(margin, nan=0.0) >= 1.0).reshape(n, n_near, len(tofs))
         worth: NDArray[np.float64] = 1.0 - np.arange(len(tofs)) / len(tofs)
         return np.asarray((flyable * worth).max(axis=2).mean(axis=1), dtype=np.float64)

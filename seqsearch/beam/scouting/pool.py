@@ -7,10 +7,10 @@ from typing import Final, Self, final
 import numpy as np
 from numpy.typing import NDArray
 
-from seqsearch.beam.frontiers.depth import no_nodes
+from feasibility.arrays import StructOfArrays
 from seqsearch.beam.rankings.protocol import Ranking
-from seqsearch.core.nodes import Nodes
-from seqsearch.core.problem import TourProblem
+from seqsearch.core.nodes import Nodes, no_nodes
+from seqsearch.core.problem import Problem
 
 _SIZE: Final = 1500
 _PER_NICHE: Final = 20
@@ -22,7 +22,7 @@ _TIRING: Final = 0.003
 
 @final
 @dataclass(frozen=True, eq=False)
-class Pool:
+class Pool(StructOfArrays):
     """Itineraries, best first, no two of which visit the same bodies.
 
     A *niche* is a region of bodies and epochs that different itineraries have in common: those
@@ -33,18 +33,15 @@ class Pool:
     ----------
     nodes : Nodes
         Ends of the n itineraries, with predicted masses and epochs.
-    picked : (n,) int64
+    times_picked : (n,) int64
         How often scouts were sent to the itinerary's niche.
     flown : (n,) bool
         Whether its legs have been optimised.
     """
 
     nodes: Nodes
-    picked: NDArray[np.int64]
+    times_picked: NDArray[np.int64]
     flown: NDArray[np.bool_]
-
-    def __len__(self) -> int:
-        return len(self.nodes)
 
     @classmethod
     def empty(cls) -> Self:
@@ -55,7 +52,7 @@ class Pool:
         self,
         found: Sequence[tuple[Nodes, int]],
         ranking: Ranking,
-        problem: TourProblem,
+        problem: Problem,
     ) -> "Pool":
         """Return the pool with new itineraries, ordered by what they are worth now.
 
@@ -67,15 +64,15 @@ class Pool:
             Ends of itineraries and how often their niche was picked, of each scout.
         ranking : Ranking
             Scores ends; smaller is better.
-        problem : TourProblem
+        problem : Problem
             For the ranking.
         """
-        parts = [(nodes, picks) for nodes, picks in found if len(nodes) and nodes.depth.max() > 0]
+        parts = [(nodes, times) for nodes, times in found if len(nodes) and nodes.depth.max() > 0]
         if not parts:
             return self
         pool = Pool(
             Nodes.concatenate([self.nodes, *(nodes for nodes, _ in parts)]),
-            np.concatenate([self.picked, *(np.full(len(n), picks) for n, picks in parts)]),
+            np.concatenate([self.times_picked, *(np.full(len(n), times) for n, times in parts)]),
             np.concatenate([self.flown, np.zeros(sum(len(n) for n, _ in parts), dtype=np.bool_)]),
         )
         # Of the same bodies in another order or at other epochs the better one stays; what has
@@ -87,7 +84,7 @@ class Pool:
         flown = np.zeros(len(first), dtype=np.bool_)
         np.logical_or.at(flown, group.ravel(), pool.flown[order])
         kept = np.argsort(first)
-        pool = replace(pool._take(order[first[kept]]), flown=flown[kept])
+        pool = replace(pool.take(order[first[kept]]), flown=flown[kept])
         niche = pool.niches()
         crowd = np.zeros(niche.max() + 1, dtype=np.int64)
         rows = []
@@ -95,7 +92,7 @@ class Pool:
             crowd[number] += 1
             if crowd[number] <= _PER_NICHE:
                 rows.append(row)
-        return pool._take(np.asarray(rows[:_SIZE], dtype=np.intp))
+        return pool.take(np.asarray(rows[:_SIZE], dtype=np.intp))
 
     def niches(self) -> NDArray[np.intp]:
         """Return (n,) the number of each itinerary's niche."""
@@ -106,8 +103,8 @@ class Pool:
         _, number = np.unique(bodies, axis=0, return_inverse=True)
         return number.ravel()
 
-    def picks(
-        self, count: int, ranking: Ranking, problem: TourProblem
+    def choose(
+        self, count: int, ranking: Ranking, problem: Problem
     ) -> tuple["Pool", NDArray[np.intp]]:
         """Choose itineraries near which to look again, the best of their niches.
 
@@ -116,7 +113,7 @@ class Pool:
         Returns
         -------
         pool : Pool
-            The pool with these picks counted.
+            The pool with these choices counted.
         rows : (count,) intp
             The itineraries; the same one more than once if there are few.
         """
@@ -124,13 +121,13 @@ class Pool:
             return self, np.zeros(0, dtype=np.intp)
         _, champions = np.unique(self.niches(), return_index=True)
         cost = _cost(self.nodes, ranking, problem)[champions]
-        picked = self.picked.copy()
+        times_picked = self.times_picked.copy()
         rows = []
         for _ in range(count):
-            row = champions[np.argmin(cost + _TIRING * picked[champions])]
-            picked[row] += 1
+            row = champions[np.argmin(cost + _TIRING * times_picked[champions])]
+            times_picked[row] += 1
             rows.append(row)
-        return replace(self, picked=picked), np.asarray(rows, dtype=np.intp)
+        return replace(self, times_picked=times_picked), np.asarray(rows, dtype=np.intp)
 
     def unflown(self, count: int) -> tuple["Pool", Nodes]:
         """Return the pool with its best unflown itineraries marked as flown, and their ends."""
@@ -139,11 +136,8 @@ class Pool:
         flown[rows] = True
         return replace(self, flown=flown), self.nodes.take(rows)
 
-    def _take(self, rows: NDArray[np.intp]) -> "Pool":
-        return Pool(self.nodes.take(rows), self.picked[rows], self.flown[rows])
 
-
-def _cost(nodes: Nodes, ranking: Ranking, problem: TourProblem) -> NDArray[np.float64]:
+def _cost(nodes: Nodes, ranking: Ranking, problem: Problem) -> NDArray[np.float64]:
     """Return (n,) the scores of nodes less what their visits are worth."""
     score = ranking.score(nodes, problem)
     deepest = nodes.depth.max()

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from feasibility.orbits import OrbitalNeighbours
 from seqsearch.core.nodes import Nodes
-from seqsearch.core.problem import TourProblem
+from seqsearch.core.problem import Problem
 
 _SPREADS_DAYS: Final = (30.0, 60.0, 120.0, 250.0)
 _NEAR: Final = (5, 10, 16)
@@ -21,7 +21,7 @@ _NEIGHBOUR_SHARE: Final = 0.7
 """Share of the starts at neighbours of those bodies, the others being at themselves."""
 
 
-def window_part(problem: TourProblem, part: int, parts: int) -> tuple[float, float]:
+def window_part(problem: Problem, part: int, parts: int) -> tuple[float, float]:
     """Return first and last epoch (MJD2000) of one of equal parts of the departure window."""
     first, last = problem.first_departure_mjd2000
     width = (last - first) / parts
@@ -29,7 +29,7 @@ def window_part(problem: TourProblem, part: int, parts: int) -> tuple[float, flo
 
 
 def starts_near(
-    problem: TourProblem,
+    problem: Problem,
     neighbours: OrbitalNeighbours,
     itinerary: Nodes,
     count: int,
@@ -41,7 +41,7 @@ def starts_near(
 
     Parameters
     ----------
-    problem : TourProblem
+    problem : Problem
         Window and start bodies.
     neighbours : OrbitalNeighbours
         Which bodies are near.

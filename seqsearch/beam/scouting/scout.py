@@ -6,12 +6,12 @@ from typing import Final, final
 import numpy as np
 from numpy.typing import NDArray
 
-from seqsearch.beam.forecast import Forecast, Prospects
+from seqsearch.beam.forecast import Forecast, PairCurves
 from seqsearch.beam.frontiers.depth import DepthFrontier
 from seqsearch.beam.rankings.balanced import BalancedRanking
 from seqsearch.core.candidates import reached
 from seqsearch.core.nodes import Nodes
-from seqsearch.core.problem import TourProblem
+from seqsearch.core.problem import Problem
 from seqsearch.settings import SearchSettings
 
 _NEIGHBOURS: Final = 16
@@ -59,13 +59,13 @@ class Scouted:
 
 
 def scout(
-    problem: TourProblem, forecast: Forecast, starts: Nodes, settings: SearchSettings
+    problem: Problem, forecast: Forecast, starts: Nodes, settings: SearchSettings
 ) -> Scouted:
     """Run a beam in which hops count as flown when the predictor says that they can be.
 
     Parameters
     ----------
-    problem : TourProblem
+    problem : Problem
         What to solve.
     forecast : Forecast
         Whom to ask.
@@ -90,11 +90,11 @@ def scout(
             sum(survey.proposed for survey in surveys),
             sum(survey.questions for survey in surveys),
         )
-        prospects = [survey.prospects for survey in surveys if len(survey.prospects)]
-        if not prospects:
+        pairs = [survey.pairs for survey in surveys if len(survey.pairs)]
+        if not pairs:
             break
-        frontier = DepthFrontier(here, problem, ranking)
-        children = _children(problem, forecast, nodes, prospects, frontier, here)
+        frontier = DepthFrontier(here.frontier, problem, ranking)
+        children = _children(problem, forecast, nodes, pairs, frontier, here)
         if len(children) == 0:
             break
         nodes, before = _numbered(children), nodes
@@ -104,26 +104,26 @@ def scout(
 
 
 def _children(
-    problem: TourProblem,
+    problem: Problem,
     forecast: Forecast,
     nodes: Nodes,
-    prospects: list[Prospects],
+    pairs: list[PairCurves],
     frontier: DepthFrontier,
     settings: SearchSettings,
 ) -> Nodes:
     """Return the nodes of the next rank: chosen by quick answers first, then by good ones."""
-    known = Prospects.concatenate(prospects)
+    known = PairCurves.concatenate(pairs)
     candidates, m_final, pair = forecast.outlook(nodes, known, settings)
     quick = reached(problem, nodes, candidates, m_final)
-    known = known.take(np.unique(pair[frontier.admit(quick, _SPARE)]))
+    known = known.take(np.unique(pair[frontier.admit(quick, settings.beam_width, _SPARE)]))
     known = forecast.sharpened(nodes, known, settings)
     candidates, m_final, _ = forecast.outlook(nodes, known, settings)
     enough = m_final - candidates.hops.dropped_kg[-1] >= problem.spacecraft.m_dry
     found = reached(problem, nodes, candidates.take(enough), m_final[enough])
-    return found.take(frontier.admit(found))
+    return found.take(frontier.admit(found, settings.beam_width))
 
 
-def _width(nodes: Nodes, problem: TourProblem, width: int) -> int:
+def _width(nodes: Nodes, problem: Problem, width: int) -> int:
     elapsed = float((nodes.t_arr_mjd2000 - nodes.t_first_mjd2000).mean())
     share = elapsed / problem.max_duration_days
     factor = np.exp(np.interp(share, _ELAPSED, np.log(_WIDTHS)))

@@ -1,4 +1,4 @@
-"""`Camp`: sends out scouts, side by side, and keeps the pool of what they found.
+"""`Scouts`: beams of predicted legs, side by side, and the pool of what they found.
 
 Part of the scouts explores: each a slice of the departure window, as niches found in one beam
 for the whole window crowd each other out. The others are sent near itineraries of the pool,
@@ -23,7 +23,7 @@ from seqsearch.beam.scouting.regions import starts_near, window_part
 from seqsearch.beam.scouting.scout import Scouted, scout
 from seqsearch.beam.starts import dense_starts
 from seqsearch.core.nodes import Nodes
-from seqsearch.core.problem import TourProblem
+from seqsearch.core.problem import Problem
 from seqsearch.settings import SearchSettings
 
 _SLICE_DAYS: Final = 300.0
@@ -52,23 +52,23 @@ beam's first rank does that: with 300 screened starts scouts ended later than wi
 class _Order:
     """What one scout is told: its seed, and a part of the window or an itinerary.
 
-    `picks` is how often the niche of that itinerary was picked.
+    `times_picked` is how often the niche of that itinerary was picked.
     """
 
     seed: int
     settings: SearchSettings
     window: tuple[float, float] | None
     near: Nodes | None
-    picks: int = 0
+    times_picked: int = 0
 
 
 @final
-class Camp:
+class Scouts:
     """Sends out scouts.
 
     Parameters
     ----------
-    problem : TourProblem
+    problem : Problem
         What to solve.
     predictor : LegPredictor
         Whom they ask.
@@ -81,18 +81,18 @@ class Camp:
 
     def __init__(
         self,
-        problem: TourProblem,
+        problem: Problem,
         predictor: LegPredictor,
         settings: SearchSettings,
         executor: Executor | None = None,
     ) -> None:
         self._problem = problem
-        self._means = _Means(problem, predictor, settings.reference_tof_days)
+        self._tools = _Tools(problem, predictor, settings.reference_tof_days)
         self._executor = executor
         self._packed = b""
         if executor is not None:
             try:
-                self._packed = pickle.dumps(self._means)
+                self._packed = pickle.dumps(self._tools)
             except (pickle.PicklingError, AttributeError, TypeError):
                 self._executor = None
 
@@ -100,7 +100,7 @@ class Camp:
         self,
         pool: Pool,
         settings: SearchSettings,
-        scouts: int,
+        count: int,
         rng: np.random.Generator,
         counters: RankCounters,
     ) -> Pool:
@@ -111,8 +111,8 @@ class Camp:
         pool : Pool
             What is known.
         settings : SearchSettings
-            `scout_width`, caps and weights.
-        scouts : int
+            Width of a scout, caps and weights.
+        count : int
             How many.
         rng : numpy.random.Generator
             Draws where they go. The result does not depend on the executor.
@@ -125,10 +125,10 @@ class Camp:
             With what they found.
         """
         ranking = BalancedRanking(settings.time_weight, settings.propellant_weight)
-        pool, orders = self._orders(pool, settings, scouts, rng, ranking)
+        pool, orders = self._orders(pool, settings, count, rng, ranking)
         found = []
         for order, scouted in zip(orders, self._send(orders), strict=True):
-            found.append((scouted.leaves, order.picks // 2))
+            found.append((scouted.leaves, order.times_picked // 2))
             counters.nodes += scouted.nodes
             counters.proposed += scouted.proposed
             counters.questions += scouted.questions
@@ -138,30 +138,30 @@ class Camp:
         self,
         pool: Pool,
         settings: SearchSettings,
-        scouts: int,
+        count: int,
         rng: np.random.Generator,
         ranking: BalancedRanking,
     ) -> tuple[Pool, list[_Order]]:
-        explorers = scouts
+        explorers = count
         if len(pool) and pool.niches().max() + 1 >= _NICHES:
-            explorers = int(np.count_nonzero(rng.random(scouts) < _EXPLORING))
+            explorers = int(np.count_nonzero(rng.random(count) < _EXPLORING))
         first, last = self._problem.first_departure_mjd2000
         slices = max(1, round((last - first) / _SLICE_DAYS))
         # Evenly spread, as few scouts have the whole window to look at.
         offset = rng.random()
         parts = [int(slices * ((offset + k / explorers) % 1.0)) for k in range(explorers)]
-        pool, rows = pool.picks(scouts - explorers, ranking, self._problem)
+        pool, rows = pool.choose(count - explorers, ranking, self._problem)
         orders = []
-        for k in range(scouts):
+        for k in range(count):
             weight = settings.propellant_weight * np.exp(_WEIGHT_SPREAD * rng.normal())
             changes: dict[str, object] = {
-                "beam_width": settings.scout_width,
+                "beam_width": settings.scouts.width,
                 "propellant_weight": float(weight),
             }
             seed = int(rng.integers(2**62))
             if k < explorers:
                 changes |= {
-                    "starts": _STARTS * settings.scout_width,
+                    "starts": _STARTS * settings.scouts.width,
                     "start_epochs": _SLICE_EPOCHS,
                 }
                 window = window_part(self._problem, parts[k], slices)
@@ -169,25 +169,25 @@ class Camp:
             else:
                 # One start body may lead to all of the best: with a cap of 0.3 none of nine scouts
                 # found the 15th asteroid that five of nine found without.
-                changes |= {"max_start_share": 1.0}
+                changes["frontier"] = {"max_start_share": 1.0}
                 row = rows[[k - explorers]]
-                near, picks = pool.nodes.take(row), int(pool.picked[row[0]])
-                orders.append(_Order(seed, settings.with_(**changes), None, near, picks))
+                near, times = pool.nodes.take(row), int(pool.times_picked[row[0]])
+                orders.append(_Order(seed, settings.with_(**changes), None, near, times))
         return pool, orders
 
     def _send(self, orders: list[_Order]) -> list[Scouted]:
         if self._executor is None:
-            return [_scouted(self._means, order) for order in orders]
+            return [_scouted(self._tools, order) for order in orders]
         futures = [self._executor.submit(_scouted_there, self._packed, order) for order in orders]
         return [future.result() for future in futures]
 
 
 @final
-class _Means:
+class _Tools:
     """What all scouts of one process share."""
 
     def __init__(
-        self, problem: TourProblem, predictor: LegPredictor, reference_tof_days: float
+        self, problem: Problem, predictor: LegPredictor, reference_tof_days: float
     ) -> None:
         self.problem = problem
         self.predictor = predictor
@@ -197,23 +197,23 @@ class _Means:
         self.forecast = Forecast(problem, predictor, self.neighbours)
 
 
-def _scouted(means: _Means, order: _Order) -> Scouted:
+def _scouted(tools: _Tools, order: _Order) -> Scouted:
     rng = np.random.default_rng(order.seed)
     settings = order.settings
     if order.near is not None:
         count = _STARTS * settings.beam_width
-        starts = starts_near(means.problem, means.neighbours, order.near, count, rng)
+        starts = starts_near(tools.problem, tools.neighbours, order.near, count, rng)
     else:
-        starts = dense_starts(means.problem, means.neighbours, settings, rng, order.window)
-    return scout(means.problem, means.forecast, means.problem.start_nodes(*starts), settings)
+        starts = dense_starts(tools.problem, tools.neighbours, settings, rng, order.window)
+    return scout(tools.problem, tools.forecast, tools.problem.start_nodes(*starts), settings)
 
 
 @functools.lru_cache(maxsize=1)
-def _unpacked(means: bytes) -> _Means:
-    unpacked = pickle.loads(means)
-    assert isinstance(unpacked, _Means)
+def _unpacked(tools: bytes) -> _Tools:
+    unpacked = pickle.loads(tools)
+    assert isinstance(unpacked, _Tools)
     return unpacked
 
 
-def _scouted_there(means: bytes, order: _Order) -> Scouted:
-    return _scouted(_unpacked(means), order)
+def _scouted_there(tools: bytes, order: _Order) -> Scouted:
+    return _scouted(_unpacked(tools), order)

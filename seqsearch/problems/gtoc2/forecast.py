@@ -6,7 +6,6 @@ answers for those that seem to lead to the best tours; and good answers for the
 flight times that are proposed.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final, final
 

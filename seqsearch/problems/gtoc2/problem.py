@@ -8,7 +8,7 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility import InputError, Legs, Spacecraft
+from feasibility import Legs, Spacecraft
 from feasibility.classifier.predictor import LegPredictor
 from feasibility.orbits import Catalogue, earth
 from seqsearch.beam.forecast import in_threads
@@ -20,7 +20,6 @@ from seqsearch.core.tree import FlownLeg
 from seqsearch.problems.gtoc2.forecast import Gtoc2Forecast
 from seqsearch.problems.gtoc2.outlook import Outlook
 from seqsearch.problems.gtoc2.rules import Gtoc2Rules
-from seqsearch.problems.moves.lambert_departure import lambert_departure
 from seqsearch.problems.rendezvous import Problem
 from seqsearch.settings import SearchSettings
 

@@ -8,3 +8,17 @@ same asteroid, at which a penetrator is left. A hop is therefore two legs: the
 relative velocity; the *transfer* begins with that velocity and ends at rest at
 the next asteroid.
 """
+
+from seqsearch.core.problem import Problem
+from seqsearch.problems.gtoc5.rules import Gtoc5Rules
+from seqsearch.problems.rendezvous import RendezvousProblem
+
+RULES = Gtoc5Rules
+
+
+def build(base: RendezvousProblem, rules: Gtoc5Rules) -> Problem:
+    """Return the problem; `base` has the asteroids, the spacecraft and the window."""
+    # Imported here: reading any problem file looks at the rules of all problems.
+    from seqsearch.problems.gtoc5.problem import Gtoc5Problem
+
+    return Gtoc5Problem(base=base, rules=rules)

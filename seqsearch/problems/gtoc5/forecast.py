@@ -1,7 +1,7 @@
 """What a predictor expects of launches, self-fly-bys and transfers from one node.
 
-Questions that only shape and order the ways go to the predictor's quick
-answers, a few percent off; one good answer a way corrects them.
+Questions that only shape and order the hops go to the predictor's quick
+answers, a few percent off; one good answer for each hop corrects them.
 """
 
 from collections.abc import Callable
@@ -11,13 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility import Legs
-from feasibility.classifier.predictor import LegPredictor, QuickPredictor
+from feasibility.classifier.predictor import LegPredictor
+from seqsearch.core.hop_margins import quick_margin_of
 from seqsearch.core.margin_curves import MarginCurves, flight_times
-from seqsearch.problems.moves.directions import even_directions
-from seqsearch.problems.moves.lambert_departure import lambert_departure
 from seqsearch.problems.gtoc5.leg_maker import LegMaker
 from seqsearch.problems.gtoc5.self_fly_by import shortest_self_fly_by_days
-from seqsearch.problems.gtoc5.visits import Visits
+from seqsearch.problems.gtoc5.transfer_plans import TransferPlans
+from seqsearch.problems.moves.directions import even_directions
+from seqsearch.problems.moves.lambert_departure import lambert_departure
 from seqsearch.settings import SearchSettings
 
 _Array = NDArray[np.float64]
@@ -48,7 +49,7 @@ _FINALISTS: Final = 3
 """Directions of a fly-by for which the margin is asked over the flight time."""
 
 _LEVELS: Final = (0.02, 0.12, 0.3, 0.55, 0.85)
-"""log(m*/m0) of the ways to a target: the shortest, and longer ones that save propellant."""
+"""log(m*/m0) of the flights to a target: the shortest, and longer ones that save propellant."""
 
 _NOWHERE: Final = -5.0
 """log(m*/m0) of legs of which nothing is known."""
@@ -56,7 +57,7 @@ _NOWHERE: Final = -5.0
 
 @final
 class Gtoc5Forecast:
-    """Finds the promising ways on from a node.
+    """Finds the promising hops from a node.
 
     Parameters
     ----------
@@ -85,16 +86,14 @@ class Gtoc5Forecast:
     ) -> None:
         self._maker = maker
         self._predictor = predictor
-        self._quick = (
-            predictor.quick_margin if isinstance(predictor, QuickPredictor) else predictor.margin
-        )
+        self._quick = quick_margin_of(predictor)
         self._settings = settings
         self.questions = 0
         self._points = points
         self._directions = even_directions(_DIRECTIONS)
 
-    def launches(self, row: int, t: float, mass: float) -> Visits | None:
-        """Return ways from the Earth to first asteroids, launched along Lambert's arc.
+    def launches(self, row: int, t: float, mass: float) -> TransferPlans | None:
+        """Return transfers from the Earth to first asteroids, launched along Lambert's arc.
 
         Parameters
         ----------
@@ -113,20 +112,20 @@ class Gtoc5Forecast:
 
         curves = self._curves(np.arange(len(target)), legs)
         best = _earliest(curves.shortest(0.0), _TARGETS)
-        found = self._ways(curves.take(best), lambda pair, tof: legs(best[pair], tof))
+        found = self._timed(curves.take(best), lambda pair, tof: legs(best[pair], tof))
         if found is None:
             return None
         pair, tof = found
         rows = target[best[pair]]
-        return Visits(
+        return TransferPlans(
             target=rows,
             fly_by_days=np.zeros(len(rows)),
             velocity=self._launch_velocity(row, t, rows, tof),
             tof_days=tof,
         )
 
-    def hops(self, row: int, t: float, mass: float, visited: _Rows) -> Visits | None:
-        """Return ways from rest at an asteroid, past it in a fly-by, to rest at others.
+    def hops(self, row: int, t: float, mass: float, visited: _Rows) -> TransferPlans | None:
+        """Return hops from rest at an asteroid, past it in a fly-by, to rest at others.
 
         Parameters
         ----------
@@ -162,21 +161,21 @@ class Gtoc5Forecast:
         pair = np.repeat(np.arange(len(target)), _FINALISTS)
         course = finalist.ravel()
 
-        def legs(way: _Rows, tof: _Array) -> Legs:
-            j = course[way]
-            return self._transfers(row, t + wait[j], velocity[j], target[pair[way]], tof, left)
+        def legs(option: _Rows, tof: _Array) -> Legs:
+            j = course[option]
+            return self._transfers(row, t + wait[j], velocity[j], target[pair[option]], tof, left)
 
         curves = self._curves(np.arange(len(pair)), legs)
         arrival = (wait[course] + curves.shortest(_LEVELS[0])).reshape(-1, _FINALISTS)
         arrival = np.where(np.isfinite(arrival), arrival, np.inf)
-        way = np.arange(len(target)) * _FINALISTS + arrival.argmin(axis=1)
-        way = way[np.isfinite(arrival.min(axis=1))]
-        found = self._ways(curves.take(way), lambda k, tof: legs(way[k], tof))
+        option = np.arange(len(target)) * _FINALISTS + arrival.argmin(axis=1)
+        option = option[np.isfinite(arrival.min(axis=1))]
+        found = self._timed(curves.take(option), lambda k, tof: legs(option[k], tof))
         if found is None:
             return None
         k, tof = found
-        chosen = way[k]
-        return Visits(
+        chosen = option[k]
+        return TransferPlans(
             target=target[pair[chosen]],
             fly_by_days=wait[course[chosen]],
             velocity=velocity[course[chosen]],
@@ -269,7 +268,7 @@ class Gtoc5Forecast:
         chosen: _Rows = open_[order]
         return chosen
 
-    def _ways(
+    def _timed(
         self, curves: MarginCurves, legs: Callable[[_Rows, _Array], Legs]
     ) -> tuple[_Rows, _Array] | None:
         """Return pairs and flight times at each level of margin, by good answers, or None."""

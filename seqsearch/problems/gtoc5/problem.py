@@ -5,29 +5,32 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Final, final
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from feasibility import InputError, Spacecraft, optimise
 from feasibility.classifier.predictor import LegPredictor
 from feasibility.orbits import Catalogue, earth
+from feasibility.runtime.workers import in_threads
 from feasibility.sims_flanagan import solve_max_initial_mass
-from seqsearch.beam.forecast import in_threads
-from seqsearch.core.candidates import Candidates
-from seqsearch.core.custom_moves import Proposal
+from seqsearch.core.custom_moves import CustomCandidates, CustomMoves
+from seqsearch.core.hops import Hops
+from seqsearch.core.mission import days_until_end, not_visited
 from seqsearch.core.nodes import Nodes
-from seqsearch.core.problem import Hops
+from seqsearch.core.recording import tour_body
 from seqsearch.core.tree import FlownLeg
-from seqsearch.problems.moves.directions import even_directions
 from seqsearch.problems.gtoc5.element_distance import phase_free_points
 from seqsearch.problems.gtoc5.forecast import FLY_BY_STRETCH, Gtoc5Forecast
-from seqsearch.problems.moves.lambert_departure import lambert_departure
 from seqsearch.problems.gtoc5.leg_maker import LegMaker
 from seqsearch.problems.gtoc5.rules import Gtoc5Rules
 from seqsearch.problems.gtoc5.self_fly_by import shortest_self_fly_by_days
-from seqsearch.problems.gtoc5.visits import Visits
-from seqsearch.problems.rendezvous import Problem
+from seqsearch.problems.gtoc5.transfer_plans import TransferPlans
+from seqsearch.problems.moves.directions import even_directions
+from seqsearch.problems.moves.lambert_departure import lambert_departure
+from seqsearch.problems.rendezvous import RendezvousProblem
 from seqsearch.settings import SearchSettings
+from seqsearch.tours.tour import TourRules
 
 _Array = NDArray[np.float64]
 
@@ -49,7 +52,7 @@ class Gtoc5Problem:
 
     Parameters
     ----------
-    base : Problem
+    base : RendezvousProblem
         Name, spacecraft, masses, window and duration; its catalogue are the
         asteroids. Its stays and starts play no part.
     rules : Gtoc5Rules
@@ -62,7 +65,7 @@ class Gtoc5Problem:
         is below what a single visit needs.
     """
 
-    base: Problem
+    base: RendezvousProblem
     rules: Gtoc5Rules
 
     def __post_init__(self) -> None:
@@ -134,6 +137,11 @@ class Gtoc5Problem:
     def _points(self) -> _Array:
         return phase_free_points(self.catalogue)
 
+    @property
+    def custom_moves(self) -> CustomMoves:
+        """The problem itself: it launches, and shapes its fly-bys before they are proposed."""
+        return self
+
     def start_rows(self) -> NDArray[np.intp]:
         """Return the catalogue row of the Earth."""
         return np.zeros(1, dtype=np.intp)
@@ -152,41 +160,56 @@ class Gtoc5Problem:
         epochs = earliest + (np.arange(n) + rng.random(n)) / n * (latest - earliest)
         return self.start_nodes(np.zeros(n, dtype=np.intp), epochs)
 
-    def moves(
+    def candidates(
         self, nodes: Nodes, settings: SearchSettings, predictor: LegPredictor, threads: int, /
-    ) -> Iterator[Proposal]:
+    ) -> Iterator[CustomCandidates]:
         """Propose launches or hops from each node, at several flight times for each target."""
 
-        def propose(k: int) -> Proposal | None:
-            return self._proposal(nodes, k, settings, predictor)
+        def propose(k: int) -> CustomCandidates | None:
+            return self._from_node(nodes, k, settings, predictor)
 
-        for proposal in in_threads(propose, range(len(nodes)), threads):
-            if proposal is not None:
-                yield proposal
+        for found in in_threads(propose, range(len(nodes)), threads):
+            if found is not None:
+                yield found
 
-    def _proposal(
+    def _from_node(
         self, nodes: Nodes, k: int, settings: SearchSettings, predictor: LegPredictor
-    ) -> Proposal | None:
-        """Return the moves from one node; None for none."""
+    ) -> CustomCandidates | None:
+        """Return the candidates from one node; None for none."""
         forecast = Gtoc5Forecast(self.maker, self._points, predictor, settings)
         row, t, mass = int(nodes.row[k]), float(nodes.t_ready_mjd2000[k]), float(nodes.mass[k])
         launch = bool(nodes.depth[k] == 0)
         if launch:
-            visits = forecast.launches(row, t, mass)
+            plans = forecast.launches(row, t, mass)
         else:
-            visits = forecast.hops(row, t, mass, nodes.visited[k, : nodes.depth[k] + 1])
-        if visits is None:
+            plans = forecast.hops(row, t, mass, nodes.visited[k, : nodes.depth[k] + 1])
+        if plans is None:
             return None
-        parent = np.full(len(visits), k)
-        hops = self._chains(nodes, parent, np.full(len(visits), t), visits, launch=launch)
-        m_final = predictor.final_mass(hops.stages[-1])
+        parent = np.full(len(plans), k)
+        hops = self._chains(nodes, parent, np.full(len(plans), t), plans, launch=launch)
+        m_final = predictor.final_mass(hops.legs[-1])
         known = np.isfinite(m_final)
         first = t if launch else float(nodes.t_first_mjd2000[k])
         within = known & self._leaves_room(hops.t_arr_mjd2000 - first, m_final)
         if not within.any():
             return None
-        candidates = Candidates(parent, visits.target, hops).take(within)
-        return Proposal(candidates, m_final[within], forecast.questions + len(hops))
+        return CustomCandidates(
+            parent[within],
+            plans.target[within],
+            hops.take(within),
+            m_final[within],
+            forecast.questions + len(hops),
+        )
+
+    def may_visit(self, nodes: Nodes, target: NDArray[np.intp], /) -> NDArray[np.bool_]:
+        """Return (n, t) whether targets, catalogue rows (n, t), were not visited before."""
+        return not_visited(nodes, target)
+
+    def days_left(self, nodes: Nodes, t_dep_mjd2000: _Array, /) -> _Array:
+        """Return (n, d) days until the longest duration is over; -inf outside the window."""
+        return days_until_end(
+            nodes, t_dep_mjd2000, self.first_departure_mjd2000[1], self.max_duration_days
+        )
 
     def hops(
         self,
@@ -197,7 +220,7 @@ class Gtoc5Problem:
         tof_days: _Array,
         /,
     ) -> Hops:
-        """Return the (k,) hops with velocities along Lambert's arcs; see `TourProblem.hops`.
+        """Return the (k,) hops with velocities along Lambert's arcs; see `Problem.hops`.
 
         A self-fly-by takes a fixed multiple of the closed form's time, at most half of the hop.
         """
@@ -216,8 +239,8 @@ class Gtoc5Problem:
             least_m_s=0.0 if launch else speed,
             most_m_s=rules.launch_speed_max_m_s if launch else speed,
         )
-        visits = Visits(target, wait, velocity, tof_days - wait)
-        return self._chains(nodes, parent, t_dep_mjd2000, visits, launch=launch)
+        plans = TransferPlans(target, wait, velocity, tof_days - wait)
+        return self._chains(nodes, parent, t_dep_mjd2000, plans, launch=launch)
 
     def closing(self, row: int, t_mjd2000: float, mass: float, /) -> tuple[FlownLeg, ...]:
         """Return the last self-fly-by, in the direction that leaves most mass; none at the Earth.
@@ -257,31 +280,46 @@ class Gtoc5Problem:
             ),
         )
 
+    def tour_cost(self, nodes: Nodes, settings: SearchSettings, /) -> _Array:
+        """Return (n,) the weighted shares of time and propellant that are used up."""
+        return self.base.tour_cost(nodes, settings)
+
+    def tour_rules(self) -> TourRules:
+        """Return the numbers of the problem, with launch, fly-bys, drops and points."""
+        return msgspec.structs.replace(
+            self.base.tour_rules(),
+            min_stay_days=self.min_stay_days,
+            start_ids=self.start_ids,
+            events=self.rules.events(tour_body(self.catalogue, 0)),
+            start_counts=False,
+            score=self.rules.points(),
+        )
+
     def _chains(
         self,
         nodes: Nodes,
         parent: NDArray[np.intp],
         t_dep_mjd2000: _Array,
-        visits: Visits,
+        plans: TransferPlans,
         *,
         launch: bool,
     ) -> Hops:
-        """Return the legs of ways from nodes: a launch, or a self-fly-by and a transfer."""
-        n, make, rules = len(visits), self.maker, self.rules
+        """Return the legs of hops from nodes: a launch, or a self-fly-by and a transfer."""
+        n, make, rules = len(plans), self.maker, self.rules
         row, mass = nodes.row[parent], nodes.mass[parent]
         package = np.full(n, rules.package_kg)
         left = mass if launch else make.mass_after_fly_by(mass, FLY_BY_STRETCH)
         transfers = make.transfers(
             row,
-            t_dep_mjd2000 + visits.fly_by_days,
-            visits.velocity,
-            visits.target,
-            visits.tof_days,
+            t_dep_mjd2000 + plans.fly_by_days,
+            plans.velocity,
+            plans.target,
+            plans.tof_days,
             left,
         )
         if launch:
             return Hops((transfers,), (package,))
-        fly_bys = make.self_fly_bys(row, t_dep_mjd2000, visits.velocity, visits.fly_by_days, mass)
+        fly_bys = make.self_fly_bys(row, t_dep_mjd2000, plans.velocity, plans.fly_by_days, mass)
         return Hops((fly_bys, transfers), (np.full(n, rules.penetrator_kg), package))
 
     def _leaves_room(self, elapsed_days: _Array, m_final: _Array) -> NDArray[np.bool_]:

@@ -5,6 +5,10 @@ from typing import Annotated, final
 import msgspec
 from msgspec import Meta
 
+from seqsearch.tours.events import Drop, FlyBy, Launch, TourEvent
+from seqsearch.tours.records import TourBody
+from seqsearch.tours.scores import Points
+
 _Positive = Annotated[float, Meta(gt=0)]
 _NotNegative = Annotated[float, Meta(ge=0)]
 
@@ -39,3 +43,20 @@ class Gtoc5Rules(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
     fly_by_score: _NotNegative = 0.8
     bonus_ids: tuple[int, ...] = (1,)
     bonus_factor: _Positive = 1.5
+
+    def events(self, planet: TourBody) -> tuple[TourEvent, ...]:
+        """Return what tours that are launched from a planet may and have to do."""
+        return (
+            Launch(planet=planet, speed_max_m_s=self.launch_speed_max_m_s),
+            FlyBy(speed_min_m_s=self.fly_by_speed_min_m_s),
+            Drop(rendezvous_kg=self.package_kg, fly_by_kg=self.penetrator_kg),
+        )
+
+    def points(self) -> Points:
+        """Return what tours are scored by."""
+        return Points(
+            rendezvous=self.rendezvous_score,
+            fly_by=self.fly_by_score,
+            bonus_ids=self.bonus_ids,
+            bonus_factor=self.bonus_factor,
+        )

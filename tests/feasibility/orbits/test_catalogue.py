@@ -137,6 +137,45 @@ def test_a_catalogue_can_be_pickled_small_and_comes_back_equal(belt):
     assert back.names == belt.names
 
 
+def test_further_columns_follow_their_bodies_through_selection_and_pickling():
+    mass = np.array([1.0, np.nan, np.inf])
+    catalogue = Catalogue(
+        [30, 10, 20], list("abc"), 0.0, one_body().elements.repeat(3, 0), "x", {"mass": mass}
+    )
+    mass[0] = 5.0
+    assert_array_equal(catalogue.extra["mass"], [1.0, np.nan, np.inf])
+    assert_array_equal(catalogue.select([2, 0]).extra["mass"], [np.inf, 1.0])
+    assert_array_equal(catalogue.select(catalogue.ids < 15).extra["mass"], [np.nan])
+    back = pickle.loads(pickle.dumps(catalogue))
+    assert list(back.extra) == ["mass"]
+    assert_array_equal(back.extra["mass"], catalogue.extra["mass"])
+    for one in (catalogue, back):
+        with pytest.raises(ValueError, match="read-only"):
+            one.extra["mass"][0] = 0.0
+        with pytest.raises(TypeError):
+            one.extra["group"] = np.zeros(3)
+        with pytest.raises(ValueError, match="read-only"):
+            one.elements[0] = 0.0
+
+
+@pytest.mark.parametrize(
+    ("column", "message"),
+    [
+        ([1.0, 2.0], r"extra 'mass': expected shape \(1,\), one value an id, got \(2,\)"),
+        (1.0, r"extra 'mass': expected shape \(1,\)"),
+        (["heavy"], "extra 'mass': expected numbers"),
+    ],
+)
+def test_further_columns_that_do_not_fit_are_refused(column, message):
+    with pytest.raises(InputError, match=message):
+        Catalogue([7], ["body"], 0.0, one_body().elements, "x", {"mass": column})
+
+
+def test_catalogues_have_no_further_columns_of_their_own_accord(belt):
+    assert dict(belt.extra) == {}
+    assert dict(earth().extra) == {}
+
+
 def test_arrays_are_copied_and_read_only():
     elements = np.array(one_body().elements)
     catalogue = Catalogue([1], ["a"], 0.0, elements, "x")

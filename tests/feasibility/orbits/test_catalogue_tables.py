@@ -81,6 +81,15 @@ def test_every_layout_gives_the_same_orbits(tmp_path, layout):
     assert catalogue.source.endswith("table.txt")
 
 
+def test_what_is_no_part_of_the_orbit_is_kept_beside_it(tmp_path):
+    further = {name: {} for name in TABLES}
+    further["GTOC2"] = {"group": [1.0, 4.0]}
+    further["GTOC11"] = {"mass": [1.17e14, 1e13]}
+    for name, (text, _, _) in TABLES.items():
+        extra = read_catalogue(written(tmp_path, text)).extra
+        assert {key: column.tolist() for key, column in extra.items()} == further[name]
+
+
 @pytest.mark.parametrize("line_end", ["\n", "\r\n", "\r"])
 @pytest.mark.parametrize("layout", TABLES)
 def test_line_ends_a_byte_order_mark_and_the_file_name_do_not_matter(tmp_path, layout, line_end):

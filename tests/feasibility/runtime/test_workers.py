@@ -1,4 +1,4 @@
-"""The pool of workers: it mends itself, and gives up in the end."""
+"""The pool of workers: it mends itself, and gives up in the end; threads; how many of each."""
 
 import os
 import signal
@@ -8,7 +8,14 @@ from pathlib import Path
 
 import pytest
 
-from feasibility.runtime.workers import MendingPool, WorkersLostError, worker_pool
+from feasibility.runtime import workers
+from feasibility.runtime.workers import (
+    MendingPool,
+    WorkersLostError,
+    default_workers,
+    in_threads,
+    worker_pool,
+)
 
 
 @pytest.fixture
@@ -72,3 +79,42 @@ def test_after_its_end_the_pool_takes_no_calls():
     pool.shutdown()
     with pytest.raises(RuntimeError):
         pool.submit(_square, 1)
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_threads_answer_in_order_with_few_items_under_way(threads):
+    begun = []
+
+    def items():
+        for k in range(20):
+            begun.append(k)
+            yield k
+
+    answers = in_threads(_square, items(), threads)
+    assert next(answers) == 0
+    assert len(begun) <= 2 * threads + 1
+    assert list(answers) == [k * k for k in range(1, 20)]
+
+
+@pytest.mark.parametrize(
+    ("text", "processors"),
+    [
+        ("max 100000", None),
+        ("200000 100000", 2),
+        ("150000 100000", 2),
+        ("1000 100000", 1),
+        ("", None),
+    ],
+)
+def test_a_container_with_a_limit_counts_as_fewer_processors(tmp_path, text, processors):
+    file = tmp_path / "cpu.max"
+    file.write_text(text + "\n")
+    limit = workers._container_limit(file)
+    assert limit == processors or (processors is None and limit > 10_000)
+    assert workers._container_limit(tmp_path / "none") > 10_000
+
+
+def test_a_process_pinned_to_one_processor_starts_one_worker(monkeypatch):
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _: {3}, raising=False)
+    monkeypatch.setattr(os, "cpu_count", lambda: 64)
+    assert default_workers() == 1

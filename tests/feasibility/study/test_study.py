@@ -19,7 +19,7 @@ from feasibility import InputError
 from feasibility.classifier.paper.features import FEATURES
 from feasibility.commands.cli import main
 from feasibility.dataset import Dataset
-from feasibility.dataset.folds import pair_ids
+from feasibility.dataset.splits import pair_ids
 from feasibility.study import (
     EXPERIMENTS,
     fit,
@@ -438,7 +438,7 @@ def test_presets_ask_for_what_exists(preset):
     [(None, "bfloat16", 1), (None, "float32", 6), (3, "bfloat16", 3), (3, "float32", 3)],
 )
 def test_threads_follow_the_precision_unless_given(monkeypatch, given, precision, expected):
-    monkeypatch.setattr(runner.os, "cpu_count", lambda: 6)
+    monkeypatch.setattr(runner, "default_workers", lambda: 6)
     assert runner._threads(Settings(TINY, Path("out"), threads=given), precision) == expected
 
 

@@ -7,15 +7,13 @@ from hypothesis import strategies as st
 
 from feasibility import AllOf, KeepAll, Legs
 from feasibility.classifier.predictor import (
-    LambertPropellant,
-    LegPredictor,
     QuickPredictor,
     bounded_final_mass,
     lambert_final_mass,
 )
 from feasibility.orbits import OrbitalNeighbours
 from seqsearch import search
-from seqsearch.beam.forecast import Forecast, Prospects, in_threads
+from seqsearch.beam.forecast import Forecast, PairCurves
 from seqsearch.beam.starts import reachable_starts
 from seqsearch.core.margin_curves import MarginCurves, flight_times
 from tests.helpers.predictors import Toy
@@ -88,8 +86,8 @@ def test_proposed_times_are_the_shortest_that_can_be_flown(problem, neighbours):
     forecast = Forecast(problem, predictor, neighbours)
     settings = small_settings(neighbours=20, flight_time_stretches=(1.0, 1.2))
     nodes = _nodes(problem)
-    prospects = Prospects.concatenate([s.prospects for s in forecast.surveys(nodes, settings)])
-    sharp = forecast.sharpened(nodes, prospects, settings)
+    pairs = PairCurves.concatenate([s.pairs for s in forecast.surveys(nodes, settings)])
+    sharp = forecast.sharpened(nodes, pairs, settings)
     candidates, _, pair = forecast.outlook(nodes, sharp, settings)
     shortest = np.flatnonzero(np.diff(np.concatenate([[-1], pair])) != 0)
     assert 5 < len(shortest) < 60
@@ -106,7 +104,7 @@ def test_proposed_times_are_the_shortest_that_can_be_flown(problem, neighbours):
                 np.full(n, nodes.t_ready_mjd2000[parent]),
                 fine,
             )
-            margin = predictor.margin(hops.stages[0])
+            margin = predictor.margin(hops.legs[0])
             enough = margin >= 1.0 + settings.margin_reserve
             rows = [
                 i
@@ -130,11 +128,10 @@ def test_answers_do_not_depend_on_threads(problem, neighbours):
     found = []
     for threads in (1, 3):
         forecast = Forecast(problem, Toy(), neighbours, threads)
-        prospects = Prospects.concatenate([s.prospects for s in forecast.surveys(nodes, settings)])
-        found.append(forecast.outlook(nodes, prospects, settings))
+        pairs = PairCurves.concatenate([s.pairs for s in forecast.surveys(nodes, settings)])
+        found.append(forecast.outlook(nodes, pairs, settings))
     assert np.array_equal(found[0][1], found[1][1])
     assert np.array_equal(found[0][0].hops.tof_days, found[1][0].hops.tof_days)
-    assert list(in_threads(lambda x: x * x, range(20), 3)) == [x * x for x in range(20)]
 
 
 def test_targets_of_which_nothing_is_known_are_proposed_on_the_grid(problem):
@@ -172,7 +169,7 @@ def test_starts_are_those_from_which_most_can_be_reached(problem, neighbours):
                 tof = np.array([share * settings.reference_tof_days])
                 zero = np.zeros(1, dtype=np.intp)
                 legs = problem.hops(node, zero, np.array([target]), np.array([epoch]), tof)
-                legs = legs.stages[0].with_m0(1400.0)
+                legs = legs.legs[0].with_m0(1400.0)
                 total += np.clip(1.0 + np.log(Toy().margin(legs)[0]) / 0.3, 0.0, 1.0)
         return total
 
@@ -197,4 +194,3 @@ def test_final_masses_lie_between_impulses_and_full_thrust():
     burnt = legs.thrust * legs.tof_s / legs.exhaust_velocity
     assert np.all(masses >= legs.m0 - burnt - 1e-9)
     assert masses[2] > masses[1]
-    assert isinstance(LambertPropellant(Toy()), LegPredictor)

@@ -7,7 +7,8 @@ import pytest
 
 from seqsearch import search
 from seqsearch.beam.counters import RankCounters
-from seqsearch.beam.passes import Pacer, rebalanced
+from seqsearch.beam.pacing import ClockPacing
+from seqsearch.beam.rankings.rebalance import rebalanced
 from seqsearch.deadline import Deadline
 from tests.helpers.problems import small_problem, small_settings
 
@@ -40,9 +41,9 @@ def _counters(n, seconds_per_node):
 
 def test_the_beam_is_as_wide_as_the_time_left_can_pay_for(clock):
     problem = small_problem()
-    pacer = Pacer(problem, Deadline(80.0))
-    pacer.begin_pass(1)
     settings = small_settings()
+    pacer = ClockPacing(problem, Deadline(80.0), settings)
+    pacer.begin_pass(1, settings, [], scouted=False)
     nodes = _nodes(problem, 2, problem.max_duration_days / 3, 1700.0)
     # 20 s, four more ranks at this pace, 10 ms a node.
     assert pacer.width(nodes, settings, _counters(100, 0.01)) == pytest.approx(500, abs=1)
@@ -54,20 +55,20 @@ def test_the_beam_is_as_wide_as_the_time_left_can_pay_for(clock):
 
 def test_passes_grow_and_the_last_one_takes_what_is_left(clock):
     problem = small_problem()
-    pacer = Pacer(problem, Deadline(600.0))
     settings = small_settings(max_beam_width=10**6)
+    pacer = ClockPacing(problem, Deadline(600.0), settings)
     # With one rank to come and half a second a node, widths are twice the seconds.
     nodes = _nodes(problem, 1, problem.max_duration_days / 2, 1700.0)
     seconds = []
     for pass_number in (1, 2, 3):
-        pacer.begin_pass(pass_number)
+        pacer.begin_pass(pass_number, settings, [], scouted=False)
         seconds.append(pacer.width(nodes, settings, _counters(10, 0.5)) / 2)
         clock[0] += seconds[-1]
     assert seconds == pytest.approx([40, 120, 440], abs=2)
 
 
 def test_the_audit_takes_a_tenth_of_the_time(clock):
-    pacer = Pacer(small_problem(), Deadline(60.0))
+    pacer = ClockPacing(small_problem(), Deadline(60.0), small_settings())
     records = [RankCounters(pass_number=1, rank=1, nodes=9, seconds=30.0)]
     assert pacer.audits(records)
     records[0].seconds_audit = 2.0

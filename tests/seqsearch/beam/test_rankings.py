@@ -13,7 +13,7 @@ from seqsearch import search
 from seqsearch.beam.frontiers.time_slices import TimeSliceFrontier
 from seqsearch.beam.rankings import BalancedRanking, ParetoRanking, PotentialRanking, make_ranking
 from seqsearch.beam.rankings.pareto import pareto_fronts
-from seqsearch.beam.rankings.protocol import TimePropellantRanking
+from seqsearch.beam.rankings.time_propellant import TimePropellantRanking
 from seqsearch.core.nodes import Nodes
 from seqsearch.settings import SearchSettings
 from tests.helpers.problems import small_problem
@@ -168,23 +168,23 @@ _race = st.lists(
 @given(_race, st.integers(1, 4))
 def test_time_slices_give_out_the_best_of_each_slice_earliest_first(race, beam_width):
     problem = small_problem()
-    settings = SearchSettings(
-        frontier="time", slice_days=50.0, beam_width=beam_width, max_per_cell=1000
+    settings = SearchSettings().with_(
+        frontier={"kind": "time", "slice_days": 50.0, "max_per_cell": 1000}
     )
     ranking = TimePropellantRanking(settings.time_weight, settings.propellant_weight)
     depth, elapsed, mass = (np.asarray(column) for column in zip(*race, strict=True))
     # Every node at a body of its own, so that no cap but the beam width acts.
     nodes = _nodes(problem, range(len(race)), depth, elapsed, mass)
-    score = ranking.score(nodes, problem) - 1.6 * depth / settings.nominal_visits
+    score = ranking.score(nodes, problem) - 1.6 * depth / settings.frontier.nominal_visits
     frontier = TimeSliceFrontier(settings, problem, ranking)
-    admitted = frontier.admit(nodes)
+    admitted = frontier.admit(nodes, beam_width)
     for number in range(5):
         inside = np.flatnonzero(elapsed // 50.0 == number)
         best = inside[np.argsort(score[inside], kind="stable")][:beam_width]
         assert sorted(set(admitted) & set(inside)) == sorted(best)
     frontier.push(nodes)
     given_out = []
-    while len(out := frontier.pop()):
+    while len(out := frontier.pop(beam_width)):
         given_out.append(out.tree_id.tolist())
     slices = [set(elapsed[ids] // 50.0) for ids in given_out]
     assert all(len(s) == 1 for s in slices)
@@ -195,26 +195,25 @@ def test_time_slices_give_out_the_best_of_each_slice_earliest_first(race, beam_w
 @given(_race)
 def test_a_frontier_made_anew_from_what_waits_goes_on_as_the_old_one(race):
     problem = small_problem()
-    settings = SearchSettings(frontier="time", slice_days=50.0, beam_width=2)
+    settings = SearchSettings().with_(frontier={"kind": "time", "slice_days": 50.0})
     ranking = TimePropellantRanking()
     depth, elapsed, mass = (np.asarray(column) for column in zip(*race, strict=True))
     nodes = _nodes(problem, range(len(race)), depth, elapsed, mass)
     old = TimeSliceFrontier(settings, problem, ranking)
     old.push(nodes)
-    old.pop()
+    old.pop(2)
     waiting = old.waiting()
     new = TimeSliceFrontier(settings, problem, ranking)
-    if waiting is not None:
-        new.push(waiting)
-    while len(a := old.pop()):
-        assert new.pop().tree_id.tolist() == a.tree_id.tolist()
-    assert len(new.pop()) == 0
+    new.push(waiting)
+    while len(a := old.pop(2)):
+        assert new.pop(2).tree_id.tolist() == a.tree_id.tolist()
+    assert len(new.pop(2)) == 0
 
 
-@pytest.mark.parametrize("changes", [{"frontier": "time"}, {"ranking": "pareto"}])
+@pytest.mark.parametrize("changes", [{"frontier": {"kind": "time"}}, {"ranking": "pareto"}])
 def test_a_search_with_another_order_finds_a_tour(changes):
     problem = small_problem()
-    settings = SearchSettings(
+    settings = SearchSettings().with_(
         beam_width=8, starts=10, start_epochs=3, neighbours=12, solves_per_rank=60, **changes
     )
     result = search(problem, settings=settings)

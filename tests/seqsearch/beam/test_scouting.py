@@ -13,12 +13,12 @@ from feasibility.orbits import OrbitalNeighbours
 from seqsearch import search
 from seqsearch.beam.counters import RankCounters
 from seqsearch.beam.forecast import Forecast
-from seqsearch.beam.rankings.protocol import TimePropellantRanking
-from seqsearch.beam.scouting.guide import Guide, starts_of
+from seqsearch.beam.rankings.time_propellant import TimePropellantRanking
+from seqsearch.beam.scouting.guide import ItineraryGuide, starts_of
 from seqsearch.beam.scouting.pool import Pool
 from seqsearch.beam.scouting.regions import starts_near, window_part
 from seqsearch.beam.scouting.scout import scout
-from seqsearch.beam.scouting.scouts import Camp
+from seqsearch.beam.scouting.scouts import Scouts
 from seqsearch.beam.starts import dense_starts
 from seqsearch.core.nodes import Nodes
 from seqsearch.tours.verify import verify_tour
@@ -85,7 +85,7 @@ def test_itineraries_obey_the_rules_of_the_problem(problem, neighbours):
 
 def test_predicted_itineraries_are_what_the_guided_pass_flies(problem, neighbours):
     settings = small_settings(
-        pruner="default:0.99", scout_generations=1, scout_width=10, tof_days_max=240.0
+        pruner="default:0.99", scouts={"generations": 1, "width": 10}, tof_days_max=240.0
     )
     result = search(problem, settings=settings, rng=np.random.default_rng(2))
     scouts = result.counters[0]
@@ -100,7 +100,7 @@ def test_predicted_itineraries_are_what_the_guided_pass_flies(problem, neighbour
 
 def test_a_guided_pass_visits_nothing_but_its_itineraries(problem):
     settings = small_settings(
-        pruner="default:0.99", scout_generations=1, scout_width=10, tof_days_max=240.0
+        pruner="default:0.99", scouts={"generations": 1, "width": 10}, tof_days_max=240.0
     )
     guides = []
     result = search(
@@ -124,25 +124,25 @@ def test_a_guided_pass_visits_nothing_but_its_itineraries(problem):
 
 
 def test_under_a_time_limit_passes_begin_with_scouts(problem):
-    settings = small_settings(pruner="default:0.99", scout_width=10, tof_days_max=240.0)
+    settings = small_settings(pruner="default:0.99", scouts={"width": 10}, tof_days_max=240.0)
     result = search(problem, settings=settings, rng=np.random.default_rng(2), time_limit_s=6.0)
     assert result.stopped == "time limit"
     assert result.counters[0].rank == 0
     assert result.tour.n_asteroids > 2
     assert verify_tour(result.tour).passed
-    settings = settings.with_(scout_share=0.0)
+    settings = settings.with_(scouts={"share": 0.0})
     result = search(problem, settings=settings, rng=np.random.default_rng(2), time_limit_s=2.0)
     assert all(record.rank > 0 for record in result.counters)
 
 
 def test_scouts_in_other_processes_find_the_same(problem):
     def generation(executor):
-        camp = Camp(problem, Toy(), small_settings(), executor)
+        scouts = Scouts(problem, Toy(), small_settings(), executor)
         counters = RankCounters(pass_number=1, rank=0)
-        settings = small_settings(scout_width=8)
+        settings = small_settings(scouts={"width": 8})
         pool, rng = Pool.empty(), np.random.default_rng(5)
         for _ in range(2):
-            pool = camp.generation(pool, settings, 2, rng, counters)
+            pool = scouts.generation(pool, settings, 2, rng, counters)
         return pool, counters
 
     here = generation(None)
@@ -159,10 +159,10 @@ def test_a_predictor_that_cannot_be_sent_works_here(problem):
         pass
 
     with ProcessPoolExecutor(1) as executor:
-        camp = Camp(problem, Local(), small_settings(), executor)
+        scouts = Scouts(problem, Local(), small_settings(), executor)
         counters = RankCounters(pass_number=1, rank=0)
-        settings = small_settings(scout_width=5)
-        pool = camp.generation(Pool.empty(), settings, 1, np.random.default_rng(0), counters)
+        settings = small_settings(scouts={"width": 5})
+        pool = scouts.generation(Pool.empty(), settings, 1, np.random.default_rng(0), counters)
     assert counters.nodes > 0
     assert len(pool) > 0
 
@@ -174,7 +174,7 @@ tours = st.lists(
 
 @given(tours)
 def test_a_guide_allows_the_hops_of_its_itineraries_and_no_other(visits):
-    guide = Guide(_ends(*visits))
+    guide = ItineraryGuide(_ends(*visits))
     hops = {(tuple(v[: k + 1]), v[k + 1]) for v in visits for k in range(len(v) - 1)}
     nodes = _ends(*(prefix for prefix, _ in hops))
     parent, target = (a.ravel() for a in np.meshgrid(np.arange(len(nodes)), np.arange(8)))
@@ -236,12 +236,12 @@ def test_niches_are_looked_at_in_turn():
     )
     pool = Pool.empty().merged([(ends, 0)], RANKING, problem)
     assert len(np.unique(pool.niches())) == 2
-    pool, rows = pool.picks(4, RANKING, problem)
+    pool, rows = pool.choose(4, RANKING, problem)
     picked = [_visits(pool.nodes)[row] for row in rows]
     assert picked[0] == (1, 2, 3, 4, 5)
     assert (7, 8, 9, 10, 11) in picked
     assert (1, 2, 3, 4, 6) not in picked
-    assert pool.picked.sum() == 4
+    assert pool.times_picked.sum() == 4
 
 
 def test_a_longer_itinerary_is_worth_more_than_a_cheap_short_one():

@@ -161,10 +161,3 @@ def test_with_a_classifier_workers_and_threads_do_not_change_the_tour(predicted,
     assert [record.questions for record in parallel.counters] == [
         record.questions for record in predicted.counters
     ]
-
-
-def test_best_tours_visit_different_bodies_and_come_best_first(result, problem):
-    tours = result.best_tours(problem, 5)
-    assert tours[0].n_asteroids == result.tour.n_asteroids
-    assert len({frozenset(body.id for body in tour.bodies) for tour in tours}) == len(tours) == 5
-    assert np.all(np.diff([tour.n_asteroids for tour in tours]) <= 0)

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from seqsearch.beam.frontiers.selection import select
 from seqsearch.core.nodes import Nodes
-from seqsearch.settings import SearchSettings
+from seqsearch.settings import FrontierSettings
 
 
 def _nodes(rows: list[int], epochs: list[float], middles: list[int], parents: list[int]) -> Nodes:
@@ -48,10 +48,8 @@ def test_selection_keeps_every_cap_and_leaves_out_nothing_better(
     rows, epochs, middles, parents, scores = rank
     nodes = _nodes(rows, epochs, middles, parents)
     score = np.asarray(scores)
-    settings = SearchSettings(
-        beam_width=beam_width, max_per_parent=per_parent, max_per_cell=per_cell, cell_days=20.0
-    )
-    chosen = select(score, nodes, settings)
+    settings = FrontierSettings(max_per_parent=per_parent, max_per_cell=per_cell, cell_days=20.0)
+    chosen = select(score, nodes, settings, beam_width)
 
     def keys(i):
         cell = (rows[i], int(epochs[i] // 20.0))
@@ -83,15 +81,15 @@ def test_no_start_body_takes_more_than_its_share():
     visited[:, 0] = start
     nodes = replace(nodes, visited=visited)
     score = np.where(start == 1000, 0.0, 1.0) + rng.random(n)
-    wide = SearchSettings(beam_width=40, max_start_share=1.0)
-    assert np.all(start[select(score, nodes, wide)] == 1000)
-    fair = SearchSettings(beam_width=40, max_start_share=0.25)
-    counts = Counter(start[select(score, nodes, fair)].tolist())
+    wide = FrontierSettings(max_start_share=1.0)
+    assert np.all(start[select(score, nodes, wide, 40)] == 1000)
+    fair = FrontierSettings(max_start_share=0.25)
+    counts = Counter(start[select(score, nodes, fair, 40)].tolist())
     assert counts[1000] == 10
     assert sum(counts.values()) == 40
-    tight = SearchSettings(beam_width=40, max_start_share=0.01)
-    assert set(Counter(start[select(score, nodes, tight)].tolist()).values()) == {8}
+    tight = FrontierSettings(max_start_share=0.01)
+    assert set(Counter(start[select(score, nodes, tight, 40)].tolist()).values()) == {8}
 
 
 def test_an_empty_rank_gives_an_empty_beam():
-    assert len(select(np.zeros(0), _nodes([], [], [], []), SearchSettings())) == 0
+    assert len(select(np.zeros(0), _nodes([], [], [], []), FrontierSettings(), 200)) == 0

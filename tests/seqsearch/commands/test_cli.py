@@ -10,8 +10,9 @@ import tomllib
 
 import pytest
 
-from seqsearch.commands.cli import main, parse_duration
-from seqsearch.problems.problem_file import builtin_problems
+from seqsearch.commands.cli import main
+from seqsearch.commands.options import parse_duration
+from seqsearch.problems.registry import builtin_problems
 from tests.helpers.problem_texts import QUICK
 
 
@@ -135,7 +136,7 @@ def test_verify_refuses_what_is_no_tour(tmp_path, capsys, content):
 
 def test_a_tour_of_another_version_is_refused(run_folder, capsys):
     path = run_folder / "sequence.json"
-    path.write_text(path.read_text().replace("seqsearch-tour-1", "seqsearch-tour-9"))
+    path.write_text(path.read_text().replace("seqsearch-tour-2", "seqsearch-tour-9"))
     _fails(["verify", run_folder], capsys, "seqsearch-tour-9")
 
 

@@ -5,12 +5,11 @@ import pytest
 
 from feasibility import AllOf, ClassifierPruner, FeasibilityClassifier, Legs
 from feasibility.orbits import OrbitalNeighbours, orbital_metric
-from seqsearch.beam.counters import RankCounters
-from seqsearch.beam.expanders.forecast import keep_hops
 from seqsearch.beam.starts import dense_starts
-from seqsearch.core.candidates import expand, reached
+from seqsearch.core.candidates import grid_candidates, reached
+from seqsearch.core.hops import Hops
 from seqsearch.core.nodes import Nodes
-from seqsearch.core.problem import Hops
+from seqsearch.pruning.hop_pruning import keep_hops
 from tests.helpers.labelled import labelled_dataset
 from tests.helpers.problems import small_problem, small_settings
 
@@ -46,10 +45,10 @@ def test_candidates_are_neighbours_times_delays_times_flight_times(problem, neig
     t0 = problem.first_departure_mjd2000[0]
     nodes = _nodes(problem, [[5], [9]], [t0, t0 + 50], [t0, t0 + 50])
     settings = small_settings(departure_delays_days=(0.0, 20.0))
-    blocks = list(expand(problem, nodes, neighbours, settings))
+    blocks = list(grid_candidates(problem, nodes, neighbours, settings))
     assert sum(map(len, blocks)) == 2 * settings.neighbours * 2 * len(settings.tof_days())
     for block in blocks:
-        (legs,) = block.hops.stages
+        (legs,) = block.hops.legs
         delay = legs.t_dep_mjd2000 - nodes.t_ready_mjd2000[block.parent]
         assert set(delay) == {0.0, 20.0}
         assert np.array_equal(legs.m0, nodes.mass[block.parent])
@@ -65,7 +64,7 @@ def test_visited_bodies_are_not_proposed_again(problem, neighbours):
     t = problem.first_departure_mjd2000[0]
     near = neighbours.query([5], [t], 3)[0]
     nodes = _nodes(problem, [[near[0], near[1], 5]], [t], [t - 200.0])
-    (block,) = expand(problem, nodes, neighbours, small_settings())
+    (block,) = grid_candidates(problem, nodes, neighbours, small_settings())
     assert not set(near[:2]) & set(block.target)
     assert 5 not in block.target
     assert near[2] in block.target
@@ -74,26 +73,28 @@ def test_visited_bodies_are_not_proposed_again(problem, neighbours):
 def test_no_arrival_beyond_the_duration_and_no_late_first_departure(problem, neighbours):
     earliest, latest = problem.first_departure_mjd2000
     nodes = _nodes(problem, [[7, 5]], [earliest + 600.0], [earliest])
-    (block,) = expand(problem, nodes, neighbours, small_settings())
+    (block,) = grid_candidates(problem, nodes, neighbours, small_settings())
     arrival = block.hops.t_arr_mjd2000
     assert (arrival - earliest).max() <= problem.max_duration_days
     late = _nodes(problem, [[5]], [latest], [latest])
-    (block,) = expand(problem, late, neighbours, small_settings(departure_delays_days=(0.0, 9.0)))
+    (block,) = grid_candidates(
+        problem, late, neighbours, small_settings(departure_delays_days=(0.0, 9.0))
+    )
     assert block.hops.t_dep_mjd2000.max() <= latest
 
 
 def test_nothing_is_proposed_when_time_is_up(problem, neighbours):
     earliest = problem.first_departure_mjd2000[0]
     nodes = _nodes(problem, [[7, 5]], [earliest + 720.0], [earliest])
-    assert list(expand(problem, nodes, neighbours, small_settings())) == []
+    assert list(grid_candidates(problem, nodes, neighbours, small_settings())) == []
 
 
 def test_reached_nodes_carry_the_clock_of_the_tour(problem, neighbours):
     t = problem.first_departure_mjd2000[0]
     nodes = _nodes(problem, [[5]], [t], [t])
     settings = small_settings(departure_delays_days=(10.0,))
-    (block,) = expand(problem, nodes, neighbours, settings)
-    child = reached(problem, nodes, block, block.hops.stages[0].m0 - 50.0)
+    (block,) = grid_candidates(problem, nodes, neighbours, settings)
+    child = reached(problem, nodes, block, block.hops.legs[0].m0 - 50.0)
     assert np.all(child.depth == 1)
     assert np.all(child.t_first_mjd2000 == t + 10.0)
     assert np.allclose(child.t_ready_mjd2000 - child.t_arr_mjd2000, problem.min_stay_days)
@@ -125,13 +126,12 @@ def test_starts_are_limited_to_the_given_ids():
 
 def test_hops_that_a_classifier_keeps_for_not_knowing_them_are_counted_once():
     legs = labelled_dataset(40, seed=2).legs
-    # Half of the hops have an engine that no model has seen, in the first of two stages.
+    # Half of the hops have an engine that no model has seen, in the first of two legs.
     isp = np.where(np.arange(40) < 20, 19_000.0, legs.isp)
     strange = Legs(legs.rv_dep, legs.rv_arr, legs.tof_days, legs.m0, legs.thrust, isp, 0.0)
     hops = Hops((strange, legs), (np.zeros(40), np.zeros(40)))
     pruner = AllOf(ClassifierPruner(FeasibilityClassifier.load("default")))
-    counters = RankCounters(pass_number=1, rank=1)
-    kept = keep_hops(pruner, hops, counters)
-    assert 0 < kept[:20].sum() < 20
-    assert counters.out_of_domain == kept[:20].sum()
-    assert counters.pruned == {"classifier": 40 - kept.sum()}
+    kept = keep_hops(pruner, hops)
+    assert 0 < kept.mask[:20].sum() < 20
+    assert kept.out_of_domain == kept.mask[:20].sum()
+    assert kept.pruned == {"classifier": 40 - kept.mask.sum()}

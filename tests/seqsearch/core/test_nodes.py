@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from feasibility import Legs
+from seqsearch.core.hops import Hops
 from seqsearch.core.nodes import Nodes
 from seqsearch.core.optimisation import solve_hops
-from seqsearch.core.problem import Hops, TourProblem
+from seqsearch.core.problem import Problem
 from tests.helpers.problems import small_problem
 
 
@@ -47,11 +48,11 @@ def test_visits_of_different_depth_live_together():
     assert mixed.tolist() == [[6, 8, 9, 1], [5, 2, -1, -1]]
 
 
-def test_the_rendezvous_problem_is_a_tour_problem(problem):
-    assert isinstance(problem, TourProblem)
+def test_the_rendezvous_problem_is_a_problem(problem):
+    assert isinstance(problem, Problem)
 
 
-def test_stages_of_a_hop_are_solved_with_the_mass_that_is_left(problem):
+def test_legs_of_a_hop_are_solved_with_the_mass_that_is_left(problem):
     nodes = problem.start_nodes(np.array([5]), np.array([problem.first_departure_mjd2000[0]]))
     parent = np.zeros(1, dtype=np.intp)
     t = nodes.t_ready_mjd2000
@@ -64,7 +65,7 @@ def test_stages_of_a_hop_are_solved_with_the_mass_that_is_left(problem):
     hops = Hops((coast(t), coast(t + 100.0)), (np.array([40.0]), np.array([1.0])))
     solved = solve_hops(hops, "fast")
     assert solved.flyable[0]
-    assert solved.n_legs == 2
+    assert solved.solved_legs.tolist() == [2]
     first, second = solved.solutions
     assert 1900.0 < first.m_final[0] < 2000.0
     assert second.m0[0] == first.m_final[0] - 40.0

@@ -25,8 +25,14 @@ from seqsearch.problems.problem_file import (
     to_toml,
     with_catalogue,
 )
+from seqsearch.problems.registry import plugins
 from seqsearch.pruning.pruner_spec import parse_pruner
-from seqsearch.settings import SearchSettings
+from seqsearch.settings import (
+    AuditSettings,
+    FrontierSettings,
+    ScoutSettings,
+    SearchSettings,
+)
 from tests.helpers.problem_texts import GOOD
 from tests.helpers.problems import GTOC7_TABLE, small_problem
 
@@ -145,11 +151,21 @@ def test_the_page_on_problems_names_every_key_and_its_example_can_be_read(tmp_pa
         "gtoc5": Gtoc5Rules,
         "fleet": FleetTable,
         "search": SearchSettings,
+        "search.frontier": FrontierSettings,
+        "search.scouts": ScoutSettings,
+        "search.audit": AuditSettings,
     }
-    assert set(tables) == {field.name for field in msgspec.structs.fields(Config)}
+    own = {plugin.name for plugin in plugins().values() if plugin.rules is not None}
+    top = {field.name for field in msgspec.structs.fields(Config)} | own
+    assert {name for name in tables if "." not in name} == top
+    parts = {field.name for field in msgspec.structs.fields(SearchSettings)} & {
+        name.removeprefix("search.") for name in tables if "." in name
+    }
+    assert parts == {"frontier", "scouts", "audit"}
     for name, table in tables.items():
         section = page.split(f"\n`[{name}]`")[1].split("\n`[")[0].split("\n## ")[0]
         keys = {field.name for field in msgspec.structs.fields(table)}
+        keys -= parts if name == "search" else set()
         documented = set(
             re.findall(r"`(\w+)`", "".join(re.findall(r"^\| (`.*?) \| ", section, re.M)))
         )

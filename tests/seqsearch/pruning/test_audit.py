@@ -12,8 +12,8 @@ from scipy.stats import binomtest
 
 from feasibility import Legs
 from seqsearch.core.candidates import Candidates
+from seqsearch.core.hops import Hops
 from seqsearch.core.nodes import Nodes
-from seqsearch.core.problem import Hops
 from seqsearch.deadline import Deadline
 from seqsearch.pruning.audit import RankSample
 from seqsearch.pruning.audit_estimate import AuditEstimate, RankAudit, Stratum, share_interval
@@ -53,10 +53,10 @@ def test_a_far_stratum_is_a_tripwire():
     without = AuditEstimate.of([RankAudit(pruned=(near,), kept=(kept,))])
     calm = AuditEstimate.of([RankAudit(pruned=(near, quiet), kept=(kept,))])
     assert calm.interval == without.interval
-    assert calm.interval_no_trust[1] > 2 * calm.interval[1]
+    assert calm.interval_unconditional[1] > 2 * calm.interval[1]
     tripped = replace(quiet, flyable=1)
     alarm = AuditEstimate.of([RankAudit(pruned=(near, tripped), kept=(kept,))])
-    assert alarm.interval == alarm.interval_no_trust
+    assert alarm.interval == alarm.interval_unconditional
     assert alarm.false_prune_rate > 10 * calm.false_prune_rate
     assert alarm.far_found == 1
 
@@ -123,8 +123,8 @@ class _ToyOptimiser:
     def solve_all(self, hops, solver, deadline):
         if deadline.passed():
             return None
-        self.asked = hops.stages[0].tof_days
-        masses = SimpleNamespace(m_final=hops.stages[0].m0)
+        self.asked = hops.legs[0].tof_days
+        masses = SimpleNamespace(m_final=hops.legs[0].m0)
         return SimpleNamespace(flyable=self.asked >= 95.0, solutions=(masses,))
 
 
@@ -138,7 +138,7 @@ def _candidates(tof_days):
 def _solve(blocks, solves=40, predictor=None, seed=0, optimiser=None, limit_s=None):
     sample = RankSample(np.random.default_rng(seed), 3, solves, predictor)
     for block in blocks:
-        sample.offer(block, block.hops.stages[0].tof_days >= 97.0)
+        sample.offer(block, block.hops.legs[0].tof_days >= 97.0)
     return sample.solve(
         PROBLEM,
         START,

@@ -24,7 +24,7 @@ SETTINGS = small_settings(
     start_epochs=2,
     tof_days_step=40,
     solves_per_rank=40,
-    audit_per_rank=6,
+    audit={"per_rank": 6},
     passes=2,
 )
 SEED = 4
@@ -163,7 +163,7 @@ def test_time_that_was_spent_counts(problem, whole):
 
 
 def test_the_audit_does_not_change_the_search(problem, whole):
-    settings = SETTINGS.with_(audit_per_rank=0)
+    settings = SETTINGS.with_(audit={"per_rank": 0})
     quiet = search(problem, settings=settings, rng=np.random.default_rng(SEED))
     assert quiet.tour == whole[1].tour
     assert dict(quiet.tree.graph.nodes) == dict(whole[1].tree.graph.nodes)
@@ -219,9 +219,9 @@ def test_what_is_no_checkpoint_is_refused(copied, content):
 
 def test_another_version_is_refused(copied):
     path = _third(copied)
-    content = path.read_bytes().replace(b"seqsearch checkpoint 2", b"seqsearch checkpoint 3")
+    content = path.read_bytes().replace(b"seqsearch checkpoint 3", b"seqsearch checkpoint 2")
     path.write_bytes(content)
-    _refused(copied, "another version", "checkpoint 3")
+    _refused(copied, "another version", "checkpoint 2")
 
 
 def test_a_missing_rank_is_noticed(copied):

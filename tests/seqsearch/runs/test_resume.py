@@ -21,7 +21,8 @@ from tests.helpers.problems import small_problem, small_settings
 
 QUICK = GOOD.replace("synthetic_bodies = 300", "synthetic_bodies = 1500") + (
     '[search]\npruner = "mima2:0.97"\nbeam_width = 4\nstarts = 8\nstart_epochs = 2\n'
-    "neighbours = 20\ntof_days_step = 40\nsolves_per_rank = 60\naudit_per_rank = 8\npasses = 2\n"
+    "neighbours = 20\ntof_days_step = 40\nsolves_per_rank = 60\npasses = 2\n"
+    "[search.audit]\nper_rank = 8\n"
 )
 
 
@@ -45,7 +46,10 @@ def whole(problem_file, tmp_path_factory):
 def scouted(tmp_path_factory):
     """A run of two passes that begin with scouting."""
     path = tmp_path_factory.mktemp("scouted")
-    text = QUICK.replace("mima2:0.97", "default:0.99") + "scout_generations = 1\nscout_width = 6\n"
+    text = (
+        QUICK.replace("mima2:0.97", "default:0.99")
+        + "[search.scouts]\ngenerations = 1\nwidth = 6\n"
+    )
     (path / "scouted.toml").write_text(text)
     out = path / "whole"
     arguments = ["run", str(path / "scouted.toml"), "--seed", "3", "--workers", "1"]
@@ -251,7 +255,7 @@ def test_a_bad_pruner_is_named_by_search(pruner, what, expectation, wrapped):
 
 
 def _run_with(monkeypatch, pruner, problem_file, out):
-    monkeypatch.setattr("seqsearch.commands.run.parse_pruner", lambda spec: AllOf(pruner))
+    monkeypatch.setattr("seqsearch.runs.begin.parse_pruner", lambda spec: AllOf(pruner))
     arguments = ["run", str(problem_file), "--seed", "3", "--workers", "1", "--out", str(out)]
     return main(arguments)
 
@@ -312,6 +316,6 @@ def _lost(hops, solver):
 
 def test_the_best_tour_is_not_lost_by_going_on(copied, whole, monkeypatch):
     """A rank cut short may have found more than the checkpoint before it knows."""
-    monkeypatch.setattr("seqsearch.beam.beam_search._Search._out_of_budget", lambda self: True)
+    monkeypatch.setattr("seqsearch.budget.Budget.used_up", lambda self: True)
     assert _resume(copied, "--from-rank", "1:1") == 0
     assert (copied / "sequence.json").read_bytes() == (whole / "sequence.json").read_bytes()

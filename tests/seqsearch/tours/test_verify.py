@@ -6,7 +6,7 @@ import pytest
 
 from feasibility.orbits import synthetic_main_belt
 from seqsearch import search, verify_tour
-from seqsearch.tours.tour import read_tour, to_csv, to_json
+from seqsearch.tours.tour_files import read_tour, to_csv, to_json
 from seqsearch.tours.verify import body_state
 from tests.helpers.problems import small_problem, small_settings
 

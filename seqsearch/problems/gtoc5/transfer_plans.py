@@ -1,4 +1,4 @@
-"""`Visits`: predicted ways to next visits, one row a way."""
+"""`TransferPlans`: predicted transfers to next rendezvous, one row a transfer."""
 
 from dataclasses import dataclass
 from typing import final
@@ -6,15 +6,17 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
+from feasibility.arrays import StructOfArrays
+
 _Array = NDArray[np.float64]
 
 
 @final
 @dataclass(frozen=True, eq=False)
-class Visits:
-    """Ways from a node to next rendezvous.
+class TransferPlans(StructOfArrays):
+    """Transfers from a node to next rendezvous, and the self-fly-bys before them.
 
-    With n the number of ways.
+    With n the number of transfers.
 
     Attributes
     ----------
@@ -33,6 +35,3 @@ class Visits:
     fly_by_days: _Array
     velocity: _Array
     tof_days: _Array
-
-    def __len__(self) -> int:
-        return len(self.target)

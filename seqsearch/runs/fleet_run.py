@@ -1,4 +1,4 @@
-"""What ``seqsearch run`` does for a fleet: one probe after another, each leaves its asteroids."""
+"""`run_fleet`: one probe after another, each leaves its asteroids to none that follow."""
 
 import time
 from collections.abc import Callable
@@ -6,15 +6,16 @@ from pathlib import Path
 
 import msgspec
 
-from feasibility import InputError
-from seqsearch.commands.polish import polish_run
+from feasibility.runtime.folders import new_folder
+from seqsearch.budget import Limits
 from seqsearch.problems.problem_file import Config
 from seqsearch.runs.fleet import probe_folder, write_fleet
+from seqsearch.runs.polishing import polish_run
 from seqsearch.runs.run_folder import SEQUENCE
-from seqsearch.runs.session import Budget
-from seqsearch.tours.tour import Tour, read_tour
+from seqsearch.tours.tour import Tour
+from seqsearch.tours.tour_files import read_tour
 
-SearchProbe = Callable[[Config, Path, int, Budget], int]
+SearchProbe = Callable[[Config, Path, int, Limits], int]
 """Searches with a configuration into a folder with a seed and a budget; returns the exit code."""
 
 
@@ -23,7 +24,7 @@ def run_fleet(
     folder: Path,
     *,
     seed: int,
-    budget: Budget,
+    limits: Limits,
     search_probe: SearchProbe,
 ) -> int:
     """Search and polish the probes of a fleet one after another and return the exit code.
@@ -41,7 +42,7 @@ def run_fleet(
         Is made; gets ``fleet.json`` and the sub-folders.
     seed : int
         Of the first probe; each next has the next.
-    budget : Budget
+    limits : Limits
         For the whole fleet; `max_solves` for each probe.
     search_probe : callable
         The search for one probe.
@@ -52,22 +53,15 @@ def run_fleet(
         The folder exists, or anything that a run of one probe may raise.
     """
     begin = time.monotonic()
-    try:
-        folder.mkdir(parents=True)
-    except FileExistsError:
-        raise InputError(
-            f"{folder}: exists; nothing is overwritten, choose another --out or remove it"
-        ) from None
-    except OSError as error:
-        raise InputError(f"{folder}: cannot be created ({error.strerror})") from None
+    new_folder(folder)
     probes = config.fleet.probes
     tours: list[Tour] = []
     for number in range(1, probes + 1):
         sub = folder / probe_folder(number)
         single = _without(config, [body.id for tour in tours for body in tour.bodies])
         share_s = None
-        if budget.time_limit_s is not None:
-            left_s = max(1.0, budget.time_limit_s - (time.monotonic() - begin))
+        if limits.time_limit_s is not None:
+            left_s = max(1.0, limits.time_limit_s - (time.monotonic() - begin))
             share_s = left_s / (probes - number + 1)
         probe_seed = seed + number - 1
         print(f"probe {number} of {probes}", flush=True)
@@ -76,10 +70,10 @@ def run_fleet(
             single,
             sub,
             probe_seed,
-            Budget(
+            Limits(
                 time_limit_s=None if share_s is None else (1.0 - polish_share) * share_s,
-                max_solves=budget.max_solves,
-                workers=budget.workers,
+                max_solves=limits.max_solves,
+                workers=limits.workers,
             ),
         )
         if code != 0:
@@ -89,7 +83,7 @@ def run_fleet(
                 sub,
                 time_limit_s=None if share_s is None else polish_share * share_s,
                 seed=probe_seed,
-                workers=budget.workers,
+                workers=limits.workers,
             )
         tours.append(read_tour(sub / SEQUENCE))
         write_fleet(folder, tours, probes, seed)

@@ -1,0 +1,217 @@
+"""Pacing: how long passes take and how wide their beams are.
+
+Without a time limit the settings decide. Under one a first short pass gives an answer; each of
+the next takes three times as long, and the last one takes what is left. Within a pass the beam is
+as wide as can be afforded: the time left is divided by the ranks that are still to come and by
+what a node costs.
+"""
+
+import time
+from collections.abc import Sequence
+from typing import Final, Protocol, final
+
+import numpy as np
+
+from seqsearch.beam.counters import RankCounters
+from seqsearch.core.nodes import Nodes, no_nodes
+from seqsearch.core.problem import Problem
+from seqsearch.deadline import Deadline
+from seqsearch.settings import SearchSettings
+
+_FIRST_S: Final = 40.0
+_FIRST_SHARE: Final = 0.25
+"""The first pass takes so many seconds, but no more than this share of the limit."""
+
+_GROWTH: Final = 3.0
+_LONGEST_SCOUTED_S: Final = 120.0
+"""Passes that begin with scouting do not grow beyond this, so that little is lost by an
+interruption: what was found is in the next pass's pool."""
+_NODE_S: Final = 0.02
+"""What a node costs, as long as nothing is known: on the safe side."""
+
+_SCREEN_SHARE: Final = 0.05
+_SCREENED_LEG_S: Final = 5e-6
+"""Share of a pass that is spent on the choice of starts, and what a leg costs there."""
+
+_AUDIT_SHARE: Final = 0.1
+_AUDIT_S: Final = 2.0
+"""Share of the time that the audit may take, and what one takes."""
+
+_EPOCH_S: Final = 0.2
+"""What it takes to look at all neighbourhoods at one epoch."""
+
+_NARROWEST: Final = 60
+"""Beams narrower than this spend their time on what every rank costs, however narrow."""
+
+_RECENT: Final = 3
+
+
+class Pacing(Protocol):
+    """Decides about the effort of passes and ranks."""
+
+    def begin_pass(
+        self,
+        pass_number: int,
+        settings: SearchSettings,
+        counters: Sequence[RankCounters],
+        *,
+        scouted: bool,
+    ) -> SearchSettings:
+        """Return the settings of a pass that begins now, with scouts or without.
+
+        Parameters
+        ----------
+        pass_number : int
+            From 1.
+        settings : SearchSettings
+            Those of the pass before.
+        counters : sequence of RankCounters
+            All ranks so far.
+        scouted : bool
+            Whether scouts are sent out first.
+        """
+        ...
+
+    def scouting_s(self, settings: SearchSettings) -> float | None:
+        """Return how long to scout; None for as many generations as the settings say."""
+        ...
+
+    def width(
+        self, nodes: Nodes, settings: SearchSettings, counters: Sequence[RankCounters]
+    ) -> int:
+        """Return the beam width for the next rank.
+
+        Parameters
+        ----------
+        nodes : Nodes
+            Nodes that wait to be expanded.
+        settings : SearchSettings
+            Those of the pass.
+        counters : sequence of RankCounters
+            All ranks so far.
+        """
+        ...
+
+    def audits(self, counters: Sequence[RankCounters]) -> bool:
+        """Tell whether there is time for an audit at the next rank."""
+        ...
+
+
+@final
+class FixedPacing:
+    """Takes all from the settings, however long it takes; a `Pacing`."""
+
+    def begin_pass(
+        self,
+        pass_number: int,  # noqa: ARG002
+        settings: SearchSettings,
+        counters: Sequence[RankCounters],  # noqa: ARG002
+        *,
+        scouted: bool,  # noqa: ARG002
+    ) -> SearchSettings:
+        """Return the settings as they are."""
+        return settings
+
+    def scouting_s(self, settings: SearchSettings) -> None:
+        """Return None: the number of generations is set."""
+
+    def width(
+        self,
+        nodes: Nodes,  # noqa: ARG002
+        settings: SearchSettings,
+        counters: Sequence[RankCounters],  # noqa: ARG002
+    ) -> int:
+        """Return the beam width that is set."""
+        return settings.beam_width
+
+    def audits(self, counters: Sequence[RankCounters]) -> bool:  # noqa: ARG002
+        """Audit every rank."""
+        return True
+
+
+@final
+class ClockPacing:
+    """Chooses beam widths so that a pass ends in time; a `Pacing`.
+
+    Parameters
+    ----------
+    problem : Problem
+        For the longest duration of a tour.
+    deadline : Deadline
+        With a limit.
+    settings : SearchSettings
+        Settings of the search: the least number of starts and screened legs.
+    """
+
+    def __init__(self, problem: Problem, deadline: Deadline, settings: SearchSettings) -> None:
+        self._problem = problem
+        self._deadline = deadline
+        self._base = settings
+        self._first_s = min(_FIRST_S, _FIRST_SHARE * self._remaining_s())
+        self._end = 0.0
+
+    def begin_pass(
+        self,
+        pass_number: int,
+        settings: SearchSettings,
+        counters: Sequence[RankCounters],
+        *,
+        scouted: bool,
+    ) -> SearchSettings:
+        """Set the time at which the pass shall end; about as many starts as the beam is wide."""
+        remaining = self._remaining_s()
+        wanted = self._first_s * _GROWTH ** min(pass_number - 1, 20)
+        if scouted:
+            wanted = min(wanted, _LONGEST_SCOUTED_S)
+        seconds = wanted if (1.0 + _GROWTH / 2) * wanted < remaining else remaining
+        self._end = time.monotonic() + seconds
+        screen_s = _SCREEN_SHARE * seconds
+        epochs = np.clip(
+            screen_s / _EPOCH_S, min(4, self._base.start_epochs), self._base.start_epochs
+        )
+        width = self.width(no_nodes(), settings, counters)
+        return settings.with_(
+            beam_width=width,
+            starts=max(width, min(2 * width, self._base.starts)),
+            screen_legs=max(int(screen_s / _SCREENED_LEG_S), self._base.screen_legs),
+            start_epochs=int(epochs),
+        )
+
+    def scouting_s(self, settings: SearchSettings) -> float:
+        """Return the share of the pass that belongs to scouts."""
+        return settings.scouts.share * self._seconds_of_pass()
+
+    def width(
+        self, nodes: Nodes, settings: SearchSettings, counters: Sequence[RankCounters]
+    ) -> int:
+        """Return the beam width that can be afforded, at most `max_beam_width`."""
+        recent = [record for record in counters if record.nodes and record.rank][-_RECENT:]
+        n_nodes = sum(record.nodes for record in recent)
+        seconds = sum(record.seconds - record.seconds_audit for record in recent)
+        cost_s = seconds / n_nodes if n_nodes else _NODE_S
+        left_s = self._seconds_of_pass()
+        affordable = left_s / (max(cost_s, 1e-6) * self._ranks_left(nodes, settings))
+        return int(np.clip(affordable, _NARROWEST, settings.max_beam_width))
+
+    def audits(self, counters: Sequence[RankCounters]) -> bool:
+        """Tell whether there is time for an audit at the next rank."""
+        spent_s = sum(record.seconds_audit for record in counters)
+        return spent_s + _AUDIT_S < _AUDIT_SHARE * sum(record.seconds for record in counters)
+
+    def _ranks_left(self, nodes: Nodes, settings: SearchSettings) -> float:
+        """Return about how many more legs there will be time for, at the pace so far."""
+        clock = self._problem.max_duration_days
+        if len(nodes) == 0 or nodes.depth.min() == 0:
+            return clock / (2.0 * settings.tof_days_min + self._problem.min_stay_days)
+        depth = float(nodes.depth.mean())
+        elapsed = float((nodes.t_arr_mjd2000 - nodes.t_first_mjd2000).mean())
+        return max(1.0, (clock - elapsed) / (elapsed / depth))
+
+    def _seconds_of_pass(self) -> float:
+        """Return how much of this pass's time is left."""
+        return max(0.0, self._end - time.monotonic())
+
+    def _remaining_s(self) -> float:
+        remaining = self._deadline.remaining_s()
+        assert remaining is not None
+        return remaining

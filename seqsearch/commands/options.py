@@ -1,0 +1,63 @@
+"""Options that several commands share, and what their texts mean."""
+
+import argparse
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+from feasibility import InputError
+
+if TYPE_CHECKING:
+    Commands = argparse._SubParsersAction[argparse.ArgumentParser]
+    """What a command's parser is added to."""
+
+_UNITS_S: Final = {"": 1.0, "s": 1.0, "sec": 1.0, "min": 60.0, "m": 60.0, "h": 3600.0}
+
+
+def add_limits(command: argparse.ArgumentParser) -> None:
+    """Add the options about when to stop, and the number of processes."""
+    command.add_argument(
+        "--time-limit",
+        metavar="T",
+        help="stop after 90s, 10min, 1h in all; passes go on until then",
+    )
+    command.add_argument(
+        "--max-solves",
+        type=int,
+        metavar="N",
+        help="stop after so many full optimisations in all; passes go on until then",
+    )
+    add_workers(command)
+
+
+def add_workers(command: argparse.ArgumentParser) -> None:
+    """Add the number of processes."""
+    command.add_argument("--workers", type=int, help="processes (default: one a core)")
+
+
+def seconds(duration: str | None, option: str = "--time-limit") -> float | None:
+    """Return the seconds of an optional duration."""
+    return None if duration is None else parse_duration(duration, option)
+
+
+def parse_duration(text: str, option: str = "--time-limit") -> float:
+    """Return a duration such as ``90s``, ``10min``, ``1.5h`` or ``600`` in seconds.
+
+    Raises
+    ------
+    InputError
+        Not a positive number with one of these units.
+    """
+    match = re.fullmatch(r"\s*([0-9]*\.?[0-9]+)\s*([a-z]*)\s*", text)
+    if match is None or match[2] not in _UNITS_S or float(match[1]) <= 0:
+        raise InputError(f"{option} {text!r}: expected a duration such as 90s, 10min or 1h")
+    return float(match[1]) * _UNITS_S[match[2]]
+
+
+def sequence_path(run: str) -> Path:
+    """Return the tour file that a run folder, or the path of one, stands for."""
+    # Imported here: it loads what writes runs.
+    from seqsearch.runs.run_folder import SEQUENCE
+
+    path = Path(run)
+    return path / SEQUENCE if path.is_dir() else path

@@ -1,0 +1,126 @@
+"""From the search tree to a tour: the record of a node and what leads to it."""
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.constants import DAY_S
+from feasibility.orbits import Catalogue
+from seqsearch.core.problem import Problem
+from seqsearch.core.tree import FlownLeg, SearchTree
+from seqsearch.tours.records import Impulse, TourBody, TourLeg
+from seqsearch.tours.tour import Tour
+
+_REST_M_S: Final = 1e-6
+"""Relative speed below which a spacecraft is at rest at a body."""
+
+
+def record_tour(
+    problem: Problem, tree: SearchTree, node: int, closing: tuple[FlownLeg, ...] = ()
+) -> Tour:
+    """Return the tour that leads to a node of the search tree, and on along closing legs.
+
+    Nothing is solved here.
+    """
+    flown = tree.legs_to(node)
+    last = tree.node(node)
+    rows = [flown[0].dep_row if flown else int(last["row"])]
+    rows += [leg.arr_row for leg in flown if leg.arr_row != leg.dep_row]
+    flown += closing
+    rules = problem.tour_rules()
+    bodies = tuple(tour_body(problem.catalogue, row) for row in rows)
+    legs = tuple(_leg(problem, leg) for leg in flown)
+    return Tour(
+        rules=rules,
+        t_start_mjd2000=flown[0].t_dep_mjd2000 if flown else float(last["t_mjd2000"]),
+        bodies=bodies,
+        legs=legs,
+        score=rules.score.score(bodies if rules.start_counts else bodies[1:], legs),
+    )
+
+
+def tour_body(catalogue: Catalogue, row: int) -> TourBody:
+    """Return a body of a catalogue as tour files have it."""
+    a, e, i, node, argp, anomaly = (float(value) for value in catalogue.elements[row])
+    return TourBody(
+        id=int(catalogue.ids[row]),
+        name=catalogue.names[row],
+        epoch_mjd2000=float(catalogue.epoch_mjd2000[row]),
+        a_m=a,
+        e=e,
+        i_rad=i,
+        node_rad=node,
+        argp_rad=argp,
+        mean_anomaly_rad=anomaly,
+    )
+
+
+def _leg(problem: Problem, leg: FlownLeg) -> TourLeg:
+    return TourLeg(
+        from_id=int(problem.catalogue.ids[leg.dep_row]),
+        to_id=int(problem.catalogue.ids[leg.arr_row]),
+        t_dep_mjd2000=leg.t_dep_mjd2000,
+        tof_days=leg.tof_days,
+        m0_kg=leg.m0,
+        m_final_kg=leg.m_final,
+        m_star_kg=leg.m_star,
+        impulses=_impulses(problem, leg),
+        dep_velocity_m_s=_relative(problem, leg.dep_row, leg.t_dep_mjd2000, leg.rv_dep),
+        arr_velocity_m_s=_relative(problem, leg.arr_row, leg.t_arr_mjd2000, leg.rv_arr),
+        dropped_kg=leg.dropped,
+    )
+
+
+def _relative(
+    problem: Problem, row: int, t_mjd2000: float, rv: NDArray[np.float64]
+) -> tuple[float, float, float]:
+    """Return the velocity relative to a body, in m/s; exactly zero at rest."""
+    velocity = rv[3:] - problem.catalogue.states_at([row], t_mjd2000)[0, 3:]
+    if np.linalg.norm(velocity) < _REST_M_S:
+        return (0.0, 0.0, 0.0)
+    return (float(velocity[0]), float(velocity[1]), float(velocity[2]))
+
+
+def _impulses(problem: Problem, leg: FlownLeg) -> tuple[Impulse, ...]:
+    """Turn throttles into impulses in pykep's mass convention.
+
+    An impulse is thrust x segment time x throttle / mass, with the mass before
+    the impulse in the first half of the leg and the mass after it in the
+    second half (pykep's ``leg.sims_flanagan``, cut 0.5). Masses follow the
+    rocket equation forward from the initial mass and backward from the final
+    mass; the two meet at the match point within the mass mismatch.
+    """
+    n = len(leg.throttles)
+    forward = n // 2
+    exhaust = problem.spacecraft.exhaust_velocity
+    push = problem.spacecraft.thrust * leg.tof_days / n * DAY_S
+    norms = np.linalg.norm(leg.throttles, axis=1)
+    before, after = np.empty(n), np.empty(n)
+    mass = leg.m0
+    for k in range(forward):
+        before[k] = mass
+        mass *= float(np.exp(-push * norms[k] / mass / exhaust))
+        after[k] = mass
+    mass = leg.m_final
+    for k in range(n - 1, forward - 1, -1):
+        after[k] = mass
+        mass *= float(np.exp(push * norms[k] / mass / exhaust))
+        before[k] = mass
+    reference = np.where(np.arange(n) < forward, before, after)
+    dv = leg.throttles * (push / reference)[:, None]
+    centres = leg.t_dep_mjd2000 + (np.arange(n) + 0.5) * leg.tof_days / n
+    return tuple(
+        Impulse(
+            t_mjd2000=float(centres[k]),
+            dv_m_s=(float(dv[k, 0]), float(dv[k, 1]), float(dv[k, 2])),
+            throttle=(
+                float(leg.throttles[k, 0]),
+                float(leg.throttles[k, 1]),
+                float(leg.throttles[k, 2]),
+            ),
+            mass_before_kg=float(before[k]),
+            mass_after_kg=float(after[k]),
+        )
+        for k in range(n)
+    )

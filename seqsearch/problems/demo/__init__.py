@@ -1,0 +1,1 @@
+"""The demo: a synthetic main belt; needs no file."""

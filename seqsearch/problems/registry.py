@@ -1,0 +1,104 @@
+"""Problems as plug-ins, found by the entry points ``seqsearch.problems``.
+
+A plug-in is a package with problem files (``*.toml``). If TOML alone cannot say its rules, its
+``__init__`` also offers ``RULES``, a frozen `msgspec.Struct`, and ``build(base, rules)``, which
+returns a `Problem`. The name of the entry point is then the name of the table in problem files
+that has the rules. Importing the package should cost little: all plug-ins are imported whenever
+a problem file is read.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from importlib import metadata, resources
+from typing import Any, Final, final
+
+from feasibility import InputError
+from seqsearch.core.problem import Problem
+from seqsearch.problems.rendezvous import RendezvousProblem
+
+ENTRY_POINTS: Final = "seqsearch.problems"
+"""Group of the entry points."""
+
+Build = Callable[[RendezvousProblem, Any], Problem]
+"""Makes a problem from what all problem files have, and the plug-in's own rules."""
+
+
+@final
+@dataclass(frozen=True)
+class ProblemPlugin:
+    """One plug-in.
+
+    Attributes
+    ----------
+    name : str
+        Name of the entry point, and of the table with the rules.
+    rules : type or None
+        Struct of that table; None where the plug-in has only files.
+    build : callable or None
+        Makes the problem.
+    files : dict of str to str
+        Its problem files: names of problems and TOML texts.
+    """
+
+    name: str
+    rules: type[Any] | None
+    build: Build | None
+    files: dict[str, str]
+
+
+@cache
+def plugins() -> dict[str, ProblemPlugin]:
+    """Return all plug-ins by name.
+
+    Raises
+    ------
+    InputError
+        A plug-in cannot be imported, has rules and no way to build a problem or the other way
+        round, or a name that occurs twice or cannot be that of a table.
+    """
+    found: dict[str, ProblemPlugin] = {}
+    for entry in sorted(metadata.entry_points(group=ENTRY_POINTS), key=lambda entry: entry.name):
+        if entry.name in found:
+            raise InputError(f"problem plug-in {entry.name}: two installed packages bring one")
+        found[entry.name] = _loaded(entry)
+    return found
+
+
+def builtin_problems() -> dict[str, str]:
+    """Return the names of the problems that plug-ins bring, and their TOML texts.
+
+    Raises
+    ------
+    InputError
+        As `plugins`, or two plug-ins have a problem of the same name.
+    """
+    texts: dict[str, str] = {}
+    for plugin in plugins().values():
+        for name, text in plugin.files.items():
+            if name in texts:
+                raise InputError(f"problem {name}: two installed plug-ins have one")
+            texts[name] = text
+    return dict(sorted(texts.items()))
+
+
+def _loaded(entry: metadata.EntryPoint) -> ProblemPlugin:
+    label = f"problem plug-in {entry.name}"
+    if not entry.name.isidentifier():
+        raise InputError(f"{label}: expected a name of letters, digits and underscores")
+    try:
+        module = entry.load()
+        folder = resources.files(module.__name__)
+        files = {
+            file.name.removesuffix(".toml"): file.read_text(encoding="utf-8")
+            for file in folder.iterdir()
+            if file.name.endswith(".toml")
+        }
+    except Exception as error:
+        raise InputError(
+            f"{label}: {entry.value} cannot be loaded ({type(error).__name__}: {error})"
+        ) from error
+    rules, build = getattr(module, "RULES", None), getattr(module, "build", None)
+    if (rules is None) != (build is None):
+        raise InputError(f"{label}: {entry.value} has one of RULES and build, expected both")
+    return ProblemPlugin(entry.name, rules, build, files)

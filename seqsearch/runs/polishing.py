@@ -1,0 +1,153 @@
+"""`polish_run`: reads a run folder, polishes its tours, writes what is better."""
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from feasibility import InputError
+from feasibility.runtime.atomic import write_json, write_text
+from feasibility.runtime.provenance import provenance
+from feasibility.runtime.workers import default_workers, worker_pool
+from seqsearch.core.problem import Problem
+from seqsearch.polish import PolishResult, PolishStep, distinct_tours, polish
+from seqsearch.problems.problem_file import build_problem, read_config
+from seqsearch.pruning.pruner_spec import parse_pruner, predictor_of
+from seqsearch.runs.checkpoint import FOLDER, Checkpoints, catalogue_digest
+from seqsearch.runs.run_folder import CONFIG, SEQUENCE
+from seqsearch.tours.plots import plot_tour
+from seqsearch.tours.tour import Tour
+from seqsearch.tours.tour_files import read_tour, to_csv, to_json
+
+SEARCHED: Final = "sequence.search.json"
+"""Name of the file that keeps the tour as the search found it."""
+
+REPORT: Final = "polish.json"
+"""Name of the file that says what polishing gained."""
+
+_TOURS: Final = 6
+"""Tours of the search tree that are polished together."""
+
+
+def polish_run(
+    run: Path,
+    *,
+    time_limit_s: float | None,
+    seed: int = 0,
+    workers: int | None = None,
+) -> int:
+    """Polish the tours of a run folder and return the exit code.
+
+    ``sequence.json`` is replaced if the result is better; the search's own tour
+    stays as ``sequence.search.json``. Polished again, it goes on from there.
+
+    Parameters
+    ----------
+    run : Path
+        The run folder.
+    time_limit_s : float, optional
+        Wall-clock time.
+    seed : int
+        Seed of the moves.
+    workers : int, optional
+        Processes; default: one a core.
+
+    Raises
+    ------
+    InputError
+        No run folder, or one that is damaged; a problem whose tours are more
+        than rendezvous; an asteroid table that is not the same any more.
+    """
+    if seed < 0:
+        raise InputError(f"--seed {seed}: expected zero or more")
+    if workers is not None and workers < 1:
+        raise InputError(f"--workers {workers}: expected one or more")
+    before = read_tour(run / SEQUENCE)
+    config = read_config(str(run / CONFIG))
+    problem = build_problem(config)
+    if problem.custom_moves is not None or problem.tour_rules().events:
+        raise InputError(
+            f"{run}: {problem.name} is no tour of rendezvous alone, as polishing asks"
+        )
+    tours = [before, *_searched(run, problem)]
+    if not before.legs:
+        raise InputError(f"{run / SEQUENCE}: has no leg, so there is nothing to polish")
+    predictor = predictor_of(parse_pruner(config.search.pruner))
+    if predictor is None:
+        # Imported here: loading the model is of no use to the other commands.
+        from feasibility.classifier.classifier import FeasibilityClassifier
+
+        predictor = FeasibilityClassifier.load()
+    print(f"{run}: polishing {len(tours)} tours, the best: {before.summary()}", flush=True)
+
+    def on_step(step: PolishStep, tour: Tour) -> None:
+        print(_step_line(step), flush=True)
+        if _better(tour, before):
+            _replace(run, tour)
+
+    with worker_pool(workers or default_workers()) as executor:
+        result = polish(
+            problem,
+            tours,
+            predictor=predictor,
+            rng=np.random.default_rng(seed),
+            executor=executor,
+            time_limit_s=time_limit_s,
+            on_step=on_step,
+        )
+    _report(run, before, result, seed, time_limit_s)
+    if _better(result.tour, before):
+        plot_tour(result.tour, run / "tour.png")
+    print()
+    print(result.tour.one_line())
+    print(f"{result.tour.summary()}; polish {result.stopped}, {result.moves} moves")
+    print(f"check it with: seqsearch verify {run}")
+    return 0
+
+
+def _searched(run: Path, problem: Problem) -> list[Tour]:
+    """Return distinct tours of the run's search tree; none without checkpoints."""
+    if not (run / FOLDER).is_dir():
+        return []
+    checkpoints, state = Checkpoints.load(run)
+    if catalogue_digest(problem.catalogue) != checkpoints.origin.catalogue_sha256:
+        raise InputError(
+            f"{problem.catalogue.source}: not the asteroid table that {run} was begun with"
+        )
+    return distinct_tours(problem, state.tree, _TOURS)
+
+
+def _better(tour: Tour, before: Tour) -> bool:
+    key, old = ((t.n_asteroids, -t.duration_days) for t in (tour, before))
+    return key > old
+
+
+def _replace(run: Path, tour: Tour) -> None:
+    """Write the tour; the first time, keep the search's."""
+    if not (run / SEARCHED).exists():
+        write_text(run / SEARCHED, (run / SEQUENCE).read_text(encoding="utf-8"))
+    write_text(run / SEQUENCE, to_json(tour))
+    write_text(run / "sequence.csv", to_csv(tour))
+
+
+def _step_line(step: PolishStep) -> str:
+    return (
+        f"{step.action:<9} {step.n_asteroids} asteroids, {step.duration_days:.1f} days, "
+        f"{step.m_final_kg:.1f} kg left, after {step.moves} moves, {step.seconds:.0f} s"
+    )
+
+
+def _report(
+    run: Path, before: Tour, result: PolishResult, seed: int, time_limit_s: float | None
+) -> None:
+    record = {
+        "seed": seed,
+        "time_limit_s": time_limit_s,
+        "moves": result.moves,
+        "stopped": result.stopped,
+        "replaced": _better(result.tour, before),
+        "steps": [asdict(step) for step in result.steps],
+        "provenance": provenance(),
+    }
+    write_json(run / REPORT, record)
