@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from feasibility.constants import MU_SUN
 from feasibility.orbits import Catalogue
-from seqsearch.problems.gtoc2.groups import Groups
+from seqsearch.problems.gtoc2.group_sets import GroupSets
 
 _Array = NDArray[np.float64]
 
@@ -45,14 +45,14 @@ def transfer_delta_v(catalogue: Catalogue) -> _Array:
     return delta_v
 
 
-def delta_v_to_go(delta_v: _Array, groups: Groups) -> _Array:
+def delta_v_to_go(delta_v: _Array, groups: GroupSets) -> _Array:
     """Return (2^g, n) m/s: from each body, by way of one body of each group of each set.
 
     Parameters
     ----------
     delta_v : (n, n) float64, m/s
         Between bodies.
-    groups : Groups
+    groups : GroupSets
         g groups of the n bodies.
     """
     g = groups.count

@@ -11,14 +11,15 @@ from feasibility import Spacecraft
 from feasibility.constants import DAY_S
 from feasibility.orbits import Catalogue
 from seqsearch.problems.gtoc2.delta_v import delta_v_to_go, transfer_delta_v
-from seqsearch.problems.gtoc2.groups import Groups
-from seqsearch.problems.gtoc2.score import kg_per_year
+from seqsearch.problems.gtoc2.group_sets import GroupSets
 
 _Array = NDArray[np.float64]
 _Rows = NDArray[np.intp]
 
 _DUTY: Final = 0.9
 """Share of the flight times of good tours in which the engine burns."""
+
+_YEAR_DAYS: Final = 365.25
 
 
 @final
@@ -30,7 +31,7 @@ class Outlook:
     ----------
     catalogue : Catalogue
         The bodies.
-    groups : Groups
+    groups : GroupSets
         Their groups.
     spacecraft : Spacecraft
         Thrust and specific impulse.
@@ -39,7 +40,7 @@ class Outlook:
     """
 
     catalogue: Catalogue
-    groups: Groups
+    groups: GroupSets
     spacecraft: Spacecraft
     stay_days: float
 
@@ -78,7 +79,6 @@ class Outlook:
             At the arrival.
         """
         burning = self.burn_days(mass, self._to_go[left, row])
-        stays = self.stay_days * np.bitwise_count(left)
-        return kg_per_year(
-            mass - burning * self.kg_per_day, elapsed_days + stays + burning / _DUTY
-        )
+        days = elapsed_days + self.stay_days * self.groups.sizes[left] + burning / _DUTY
+        rate: _Array = (mass - burning * self.kg_per_day) / days * _YEAR_DAYS
+        return rate

@@ -1,6 +1,7 @@
-"""`Groups`: which body belongs to which group, and sets of groups as bits of integers."""
+"""`GroupSets`: which body belongs to which group, and sets of groups as bits of integers."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Final, final
 
 import numpy as np
@@ -14,7 +15,7 @@ NO_GROUP: Final = -1
 
 @final
 @dataclass(frozen=True, eq=False)
-class Groups:
+class GroupSets:
     """The group of each body; a set of groups is an integer with their bits set.
 
     Parameters
@@ -25,10 +26,15 @@ class Groups:
 
     of_body: _Rows
 
-    @property
+    @cached_property
     def count(self) -> int:
         """Number g of groups."""
         return int(self.of_body.max(initial=NO_GROUP)) + 1
+
+    @cached_property
+    def sizes(self) -> _Rows:
+        """(2^g,) how many groups each set has."""
+        return np.array([bin(groups).count("1") for groups in range(1 << self.count)])
 
     def left(self, visited: NDArray[np.intp]) -> _Rows:
         """Return (m,) the sets of groups of which (m, w) visited rows have no body; -1 is none."""
