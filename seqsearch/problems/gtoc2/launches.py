@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from feasibility import Legs
 from feasibility.orbits import Catalogue
-from seqsearch.core.margin_curves import MarginCurves
+from seqsearch.core.margin_curves import MarginCurves, flight_times
 from seqsearch.problems.gtoc2.plans import LEVELS, Plans, at_levels
 from seqsearch.problems.gtoc2.prospects import Pairs, Prospects
 from seqsearch.problems.moves.directions import even_directions, ring_around
@@ -80,27 +80,24 @@ class Launches:
 
     def plans(self, block: _Rows) -> Plans:
         """Return launches from some nodes, at several flight times for each target."""
-        prospects, ask = self._prospects, self._questions
+        prospects = self._prospects
         pairs = prospects.pairs(block, self._speed, _TARGETS)
         soonest, velocity = self._directed(pairs)
         chosen = prospects.best(pairs, soonest, _PURSUED)
         pairs, soonest, velocity = pairs.take(chosen), soonest[chosen], velocity[chosen]
         for angle in _TURNS_RAD:
             velocity = self._turned(pairs, soonest, velocity, angle)
-        shortest, longest = (np.clip(soonest * f, *_TIMES) for f in _AROUND_SOONEST)
-        curves = ask.curves(
-            np.arange(len(pairs)),
-            shortest,
-            longest,
-            _FINE,
-            lambda k, tof: self._legs(_planned(pairs.take(k), velocity[k], tof)),
-        )
-        known = np.flatnonzero(np.isfinite(curves.shortest(LEVELS[0])))
-        pairs, velocity, curves = pairs.take(known), velocity[known], curves.take(known)
+        curves = self._curves(pairs, soonest, velocity)
         soonest = curves.shortest(LEVELS[0])
-        curves = ask.corrected(curves, soonest, self._legs(_planned(pairs, velocity, soonest)))
+        known = np.flatnonzero(np.isfinite(soonest))
+        pairs, curves, soonest = pairs.take(known), curves.take(known), soonest[known]
+        velocity = self._or_arc(pairs, soonest, velocity[known])
+        curves = self._questions.corrected(
+            curves, soonest, self._legs(_planned(pairs, velocity, soonest))
+        )
         k, tof = at_levels(curves)
-        pairs, velocity = pairs.take(k), velocity[k]
+        pairs = pairs.take(k)
+        velocity = self._or_arc(pairs, tof, velocity[k])
         return _planned(pairs, self._turned(pairs, tof, velocity, _TURNS_RAD[-1]), tof)
 
     def _directed(self, pairs: Pairs) -> tuple[_Array, _Array]:
@@ -122,6 +119,21 @@ class Launches:
         soonest = curves.shortest(_CLOSE_CALL)
         away = np.abs(np.log(times) - np.log(np.nan_to_num(soonest, nan=times[0]))[:, None])
         return soonest, best.reshape(n, _COARSE, 3)[np.arange(n), away.argmin(axis=1)]
+
+    def _curves(self, pairs: Pairs, soonest: _Array, velocity: _Array) -> MarginCurves:
+        """Return the margins over the flight time, with velocities or along Lambert's arcs."""
+        first, last = (np.clip(soonest * factor, *_TIMES) for factor in _AROUND_SOONEST)
+        tof = flight_times(first, last, _FINE)
+        k = np.repeat(np.arange(len(pairs)), _FINE)
+        arcs = self._arcs(pairs.take(k), tof.ravel())
+        options = np.stack([velocity[k], arcs], axis=1)
+        log_margin, _ = self._best_of(pairs.take(k), tof.ravel(), options)
+        return MarginCurves.through(first, last, log_margin.reshape(tof.shape))
+
+    def _or_arc(self, pairs: Pairs, tof_days: _Array, velocity: _Array) -> _Array:
+        """Return (n, 3) the better of velocities and those along Lambert's arcs."""
+        options = np.stack([velocity, self._arcs(pairs, tof_days)], axis=1)
+        return self._best_of(pairs, tof_days, options)[1]
 
     def _arcs(self, pairs: Pairs, tof_days: _Array) -> _Array:
         """Return (n, 3) m/s along Lambert's arcs."""

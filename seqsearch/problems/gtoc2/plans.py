@@ -11,7 +11,7 @@ from feasibility.arrays import StructOfArrays
 from feasibility.orbits import Catalogue
 from seqsearch.core.margin_curves import MarginCurves
 from seqsearch.core.nodes import Nodes
-from seqsearch.problems.moves.transfer_legs import transfer_legs
+from seqsearch.problems.moves.legs_between import legs_between
 
 _Array = NDArray[np.float64]
 _Rows = NDArray[np.intp]
@@ -44,16 +44,16 @@ class Plans(StructOfArrays):
 
     def legs(self, nodes: Nodes, catalogue: Catalogue, spacecraft: Spacecraft) -> Legs:
         """Return the n legs."""
-        return transfer_legs(
+        return legs_between(
             catalogue,
             spacecraft,
             nodes.row[self.parent],
-            nodes.t_ready_mjd2000[self.parent],
-            self.velocity,
             self.target,
+            nodes.t_ready_mjd2000[self.parent],
             self.tof_days,
             nodes.mass[self.parent],
-            spacecraft.m_dry,
+            least_mass=spacecraft.m_dry,
+            departure_velocity=self.velocity,
         )
 
 

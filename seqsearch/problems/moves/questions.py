@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility import Legs
-from feasibility.classifier.predictor import LegPredictor, QuickPredictor
+from feasibility.classifier.predictor import LegPredictor
+from seqsearch.core.hop_margins import quick_margin_of
 from seqsearch.core.margin_curves import MarginCurves, flight_times
 
 _Array = NDArray[np.float64]
@@ -38,9 +39,7 @@ class Questions:
 
     def __init__(self, predictor: LegPredictor) -> None:
         self._predictor = predictor
-        self._quick = (
-            predictor.quick_margin if isinstance(predictor, QuickPredictor) else predictor.margin
-        )
+        self._quick = quick_margin_of(predictor)
         self.count = 0
 
     def quick_log_margin(self, legs: Legs) -> _Array:

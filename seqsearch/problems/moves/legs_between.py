@@ -1,4 +1,4 @@
-"""Legs from bodies to rendezvous with others."""
+"""Legs from bodies to bodies, with velocities relative to them at either end."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,18 +10,20 @@ _Array = NDArray[np.float64]
 _Rows = NDArray[np.intp]
 
 
-def transfer_legs(
+def legs_between(
     catalogue: Catalogue,
     spacecraft: Spacecraft,
     row: _Rows,
-    t_mjd2000: _Array,
-    velocity: _Array | None,
     target: _Rows,
+    t_mjd2000: _Array,
     tof_days: _Array,
     mass: _Array,
+    *,
     least_mass: float,
+    departure_velocity: _Array | None = None,
+    arrival_velocity: _Array | None = None,
 ) -> Legs:
-    """Return n legs that end at rest at their targets.
+    """Return n legs.
 
     Parameters
     ----------
@@ -33,19 +35,22 @@ def transfer_legs(
         Catalogue rows of the bodies left and reached.
     t_mjd2000, tof_days : (n,) float64
         Departure epochs and flight times.
-    velocity : (n, 3) float64, m/s, or None
-        At departure, relative to the body left; None for rest.
     mass : (n,) float64, kg
         At departure; raised to `least_mass` where it is below.
     least_mass : float, kg
-        Of the legs' dry mass: what has to be left at arrival.
+        What has to be left at arrival: the legs' dry mass.
+    departure_velocity, arrival_velocity : (n, 3) float64, m/s, optional
+        Relative to the bodies left and reached; default: rest.
     """
     left = catalogue.states_at(row, t_mjd2000)
-    if velocity is not None:
-        left[:, 3:] += velocity
+    reached = catalogue.states_at(target, t_mjd2000 + tof_days)
+    if departure_velocity is not None:
+        left[:, 3:] += departure_velocity
+    if arrival_velocity is not None:
+        reached[:, 3:] += arrival_velocity
     return Legs(
         rv_dep=left,
-        rv_arr=catalogue.states_at(target, t_mjd2000 + tof_days),
+        rv_arr=reached,
         tof_days=tof_days,
         m0=np.maximum(mass, least_mass),
         thrust=spacecraft.thrust,
