@@ -69,6 +69,8 @@ def read_tour(path: Path) -> Tour:
         if found == FORMAT:
             return msgspec.json.decode(data, type=Tour, dec_hook=_record)
     except (msgspec.DecodeError, KeyError, TypeError, AttributeError) as error:
+        if isinstance(error.__cause__, InputError):
+            raise InputError(f"{path}: {error.__cause__}") from None
         raise InputError(f"{path}: not a complete {FORMAT} file ({error})") from None
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
