@@ -11,12 +11,12 @@ from feasibility import InputError
 from seqsearch.core.contract.asking import Asked, one_line
 from seqsearch.core.nodes import Nodes
 from seqsearch.core.recording import tour_body
+from seqsearch.tours.checks import Check, FlownTour
 from seqsearch.tours.events.launch import Launch
 from seqsearch.tours.events.protocol import TourEvent
 from seqsearch.tours.scores.protocol import ScoreRule
 from seqsearch.tours.tour import Tour, TourRules
 from seqsearch.tours.tour_files import read_tour, to_json
-from seqsearch.tours.verify import verify_tour
 
 _MEMBER = "tour_rules"
 
@@ -29,7 +29,7 @@ def check_rules(asked: Asked, starts: Nodes) -> None:
     asked : Asked
         The problem.
     starts : Nodes
-        Legal starts; a tour that goes no further has to be one that passes verification.
+        Legal starts; a tour that goes no further breaks none of the rules.
     """
     rules = asked.ask(_MEMBER)
     _check_numbers(asked, rules)
@@ -47,12 +47,23 @@ def check_rules(asked: Asked, starts: Nodes) -> None:
         raise asked.breach(_MEMBER, f"score of a tour without legs is {score!r}")
     tour = msgspec.structs.replace(tour, score=score)
     _check_file(asked, tour)
+    for event in rules.events:
+        _check_event(asked, event, FlownTour(tour.bodies, (), ()))
+
+
+def _check_event(asked: Asked, event: TourEvent, flown: FlownTour) -> None:
+    """Check that an event has checks, which a tour passes that only starts."""
+    kind = type(event).__name__
     try:
-        checks = verify_tour(tour, asked.problem.catalogue).checks
+        checks = event.checks(flown)
     except Exception as error:
         raise asked.breach(
-            _MEMBER, f"verification raised {type(error).__name__}: {one_line(error)}"
+            _MEMBER,
+            f"{kind}.checks raised {type(error).__name__} on a tour without legs: "
+            f"{one_line(error)}",
         ) from error
+    if not checks or not all(isinstance(check, Check) for check in checks):
+        raise asked.breach(_MEMBER, f"{kind}.checks returned {checks}, expected a list of Check")
     for check in checks:
         if not check.passed:
             raise asked.breach(

@@ -68,11 +68,10 @@ def test_its_event_and_score_survive_the_tour_file(run):
     assert rules["score"] == {"kind": "after-toll", "toll": 0.25}
 
 
-def test_a_tour_that_breaks_the_rule_of_its_event_is_not_verified(site, run, tmp_path):
-    record = json.loads((run / "sequence.json").read_text())
-    record["rules"]["events"][0]["longest_step"] = 1
-    (tmp_path / "sequence.json").write_text(json.dumps(record))
-    done = run_with(site, "-m", "seqsearch", "verify", str(tmp_path / "sequence.json"))
+def test_a_tour_that_breaks_the_rule_of_its_event_is_not_verified(site, run):
+    stricter = (run / "config.toml").read_text().replace("longest_step = 1200", "longest_step = 1")
+    (site / "stricter.toml").write_text(stricter)
+    done = run_with(site, "-m", "seqsearch", "verify", str(run), "--problem", "stricter.toml")
     assert done.returncode == 1
     assert "FAIL  ids ascend" in done.stdout
     assert done.stdout.count("FAIL") == 1
