@@ -109,7 +109,19 @@ class Config(_Table, frozen=True, kw_only=True):
 
 @cache
 def _whole() -> type[Config]:
-    """Return the struct of problem files with a field for the rules of each plug-in."""
+    """Return the struct of problem files with a field for the rules of each plug-in.
+
+    Raises
+    ------
+    InputError
+        As `plugins`, or a plug-in's table has the name of one that all problem files have.
+    """
+    ours = [name for name in Config.__struct_fields__ if name in plugins()]
+    if ours:
+        raise InputError(
+            f"problem plug-in {ours[0]}: expected another name, as every problem file has a "
+            f"table [{ours[0]}]"
+        )
     tables = [
         (plugin.name, plugin.rules | None, None)
         for plugin in plugins().values()
