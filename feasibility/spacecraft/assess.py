@@ -201,7 +201,7 @@ def judgement(
     recall_asked: float,
     recall: Share,
 ) -> tuple[str, tuple[str, ...]]:
-    """Return the verdict and its reasons: docs/spacecraft.md states the rule.
+    """Return the verdict and its reasons: docs/guide/spacecraft.md states the rule.
 
     Parameters are those of `Assessment`; `sides` are the shares behind the balanced accuracy.
     """
