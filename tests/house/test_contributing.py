@@ -5,6 +5,7 @@ import re
 import subprocess
 import sys
 import tomllib
+from importlib import metadata
 from pathlib import Path
 
 import pytest
@@ -38,7 +39,9 @@ def pasted(tmp_path):
         path.write_text(content, encoding="utf-8")
     table = tomllib.loads(_block("toml", "[project.entry-points"))
     ((group, lines),) = table["project"]["entry-points"].items()
-    points = "".join(f"{name} = {module}\n" for name, module in lines.items())
+    # Where somebody has pasted the example into the checkout it is installed already.
+    there = {entry.name for entry in metadata.entry_points(group=group)}
+    points = "".join(f"{name} = {at}\n" for name, at in lines.items() if name not in there)
     installed = tmp_path / "example-1.0.dist-info"
     installed.mkdir()
     (installed / "METADATA").write_text("Metadata-Version: 2.1\nName: example\nVersion: 1.0\n")
