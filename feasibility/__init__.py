@@ -11,6 +11,7 @@ from feasibility.errors import InputError, MissingDependencyError
 from feasibility.legs import Legs, Spacecraft
 
 if TYPE_CHECKING:
+    from feasibility.classifier.check import check_predictor
     from feasibility.classifier.classifier import FeasibilityClassifier
     from feasibility.pruners import (
         AllOf,
@@ -35,6 +36,7 @@ _HOMES = {
     "Mima2Pruner": "feasibility.pruners",
     "MimaPruner": "feasibility.pruners",
     "Pruner": "feasibility.pruners",
+    "check_predictor": "feasibility.classifier.check",
     "check_pruner": "feasibility.pruners",
     "LegSolutions": "feasibility.sims_flanagan",
     "max_initial_mass": "feasibility.sims_flanagan",
@@ -55,6 +57,7 @@ __all__ = [
     "MissingDependencyError",
     "Pruner",
     "Spacecraft",
+    "check_predictor",
     "check_pruner",
     "max_initial_mass",
     "optimise",

@@ -32,8 +32,3 @@ EARTH_VELOCITY: Final = (MU_SUN / AU) ** 0.5
 def mjd_to_mjd2000(mjd: float) -> float:
     """Convert a modified Julian date to MJD2000 (days since 2000-01-01 00:00)."""
     return mjd - MJD2000_MJD
-
-
-def mjd2000_to_mjd(mjd2000: float) -> float:
-    """Convert MJD2000 to a modified Julian date."""
-    return mjd2000 + MJD2000_MJD

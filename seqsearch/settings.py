@@ -136,9 +136,9 @@ class SearchSettings(_Table, frozen=True, kw_only=True):
     ranking : str
         Which nodes are better: ``"weighted"`` time and propellant, ``"balanced"``, where what
         is scarcer counts more, ``"pareto"`` fronts of both, or ``"potential"``, weighted with a
-        penalty for few ways on (needs a classifier).
+        penalty where few targets can be reached (needs a classifier).
     potential_weight : float
-        Penalty of a node without a way on, for the ranking ``"potential"``.
+        Penalty of a node from which no target can be reached, for the ranking ``"potential"``.
     frontier : FrontierSettings
         The table ``[search.frontier]``.
     scouts : ScoutSettings

@@ -21,6 +21,7 @@ import numpy as np
 from feasibility import FeasibilityClassifier
 from feasibility.dataset import Dataset, read_dataset
 from feasibility.evaluation.evaluate import evaluate
+from feasibility.evaluation.tables import markdown_table
 from feasibility.learning.margin.train import MarginRecipe, train_margin
 from feasibility.runtime.atomic import atomic_path, write_text
 
@@ -38,7 +39,7 @@ SMALLEST_BATCH, LARGEST_BATCH = 128, 1024
 
 
 def recipe(legs: int, threads: int) -> MarginRecipe:
-    """Return how to train on so many legs: smaller batches and more epochs for fewer legs."""
+    """Return how to train on a number of legs: smaller batches and more epochs for fewer legs."""
     learned = int(0.85 * legs)
     batch = int(np.clip(learned // 100, SMALLEST_BATCH, LARGEST_BATCH))
     steps = STEPS if batch == LARGEST_BATCH else STEPS // 2
@@ -47,7 +48,7 @@ def recipe(legs: int, threads: int) -> MarginRecipe:
 
 
 def parts(datasets: list[Dataset], legs: int) -> list[Dataset]:
-    """Return so many legs of all datasets, each in proportion."""
+    """Return a number of legs of all datasets, each in proportion."""
     rng = np.random.default_rng([1, legs])
     total = sum(len(dataset) for dataset in datasets)
     return [
@@ -63,16 +64,18 @@ def measures(classifier: FeasibilityClassifier, tests: dict[str, Dataset]) -> di
 
 def table(curve: dict[int, dict[str, dict[str, float]]]) -> str:
     """Return the figures as Markdown."""
-    lines = [
-        "| legs | search | within 15 % | within 5 % | error of log m* | table1, balanced | "
-        "within 15 % | within 5 % | nea, balanced | within 15 % | within 5 % |",
-        "|---|---|---|---|---|---|---|---|---|---|---|",
+    tests = [
+        name
+        for shown in ("search", "table1, balanced", "nea, balanced")
+        for name in (shown, "within 15 %", "within 5 %")
     ]
-    for legs, found in sorted(curve.items()):
-        cells = [f"{found[test][name]:.4f}" for test in TESTS for name in SHOWN[test]]
-        cells.insert(3, f"{found['search']['median_log_margin_error_near']:.5f}")
-        lines.append(f"| {legs} | " + " | ".join(cells) + " |")
-    return "\n".join(lines)
+    headers = ["legs", *tests[:3], "error of log m*", *tests[3:]]
+    rows = []
+    for legs, metrics in sorted(curve.items()):
+        cells = [f"{metrics[test][name]:.4f}" for test in TESTS for name in SHOWN[test]]
+        cells.insert(3, f"{metrics['search']['median_log_margin_error_near']:.5f}")
+        rows.append([str(legs), *cells])
+    return markdown_table(headers, rows)
 
 
 def draw(curve: dict[int, dict[str, dict[str, float]]], path: Path) -> None:
@@ -123,7 +126,7 @@ def main() -> int:
         known[str(legs)] = measures(classifier, tests)
         write_text(record, json.dumps(known, indent=1) + "\n")
         print(f"{legs} legs: {time.process_time() - clock:.0f} s of processor time", flush=True)
-    curve = {int(legs): found for legs, found in known.items()}
+    curve = {int(legs): metrics for legs, metrics in known.items()}
     draw(curve, record.with_suffix(".png"))
     print(table(curve))
     return 0

@@ -4,7 +4,7 @@ The file is a zip archive: ``manifest.json``, ``manifest.sha256`` with its
 digest, and one ``.npy`` a array, whose digests the manifest has. Arrays are
 named by section:
 
-- ``model/...``: what `inference` predicts from;
+- ``model/...``: what the predictors of its kind read;
 - ``scaler/mean``, ``scaler/std`` (k,): the standardisation of the k inputs;
 - ``domain/low``, ``domain/high`` (k,): range of the inputs in training, a
   little widened; ``domain/isp`` (2,), s, and ``domain/thrust`` (2,), N;

@@ -191,8 +191,8 @@ class FeasibilityClassifier:
         if not 0.0 < recall <= 1.0:
             raise InputError(f"recall: {recall}, expected above 0 and at most 1")
         # The tolerance keeps 1 - 0.99 from being a little less than a hundredth.
-        lost = int((1.0 - recall) * len(self._positive) + 1e-9)
-        return float(self._positive[lost])
+        below = int((1.0 - recall) * len(self._positive) + 1e-9)
+        return float(self._positive[below])
 
     def _margin_estimator(self) -> MarginEstimator:
         if not isinstance(self._estimator, MarginEstimator):

@@ -1,65 +1,78 @@
-"""The `LegPredictor` protocol: what a search asks to order candidate legs before it solves any."""
+"""`LegPredictor`: what a search asks about candidate legs before it solves any.
 
-from dataclasses import dataclass
-from typing import Final, Protocol, final, runtime_checkable
+The contract of a predictor of one's own, with `QuickPredictor` for one that has cheap answers
+too, and estimates of final masses for one that knows margins alone.
+"""
+
+from typing import Final, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.legs import Legs
-from feasibility.orbits.lambert import lambert
+from feasibility.orbits.lambert import lambert_delta_v
 
 
 @runtime_checkable
 class LegPredictor(Protocol):
     """Predicts how far legs are from the boundary of what can be flown, and what they cost.
 
-    The contract: row-wise and pure, as for `Pruner`; a NaN says that nothing is known
-    about a leg. `FeasibilityClassifier` fulfils it with a margin model.
+    A search orders candidates by the answers, finds the shortest flight times with them, and
+    drops what is hopeless. `FeasibilityClassifier` is one with a margin model. The contract,
+    which `feasibility.check_predictor` tests:
+
+    - one float64 a leg; NaN says that nothing is known about it, which never counts against it;
+    - row-wise: the answer for a leg depends on that leg alone, to the last digit, so that a
+      search may split and merge batches;
+    - pure: the same legs get the same answer, also where several threads ask at once, and the
+      legs are not changed;
+    - no legs is a legal batch;
+    - picklable, so that it can travel to worker processes.
+
+    Nothing relies on more: an exact m* does not depend on the initial mass, so that the margin
+    falls as 1/m0, but an estimate need not.
+
+    Examples
+    --------
+    >>> from feasibility.orbits.mima import mima
+    >>> class Mima:
+    ...     def margin(self, legs, /):
+    ...         states = legs.rv_dep, legs.rv_arr, legs.tof_s
+    ...         mass = mima(*states, legs.thrust, legs.exhaust_velocity)
+    ...         return np.where(mass > 0.0, mass / legs.m0, np.nan)
+    ...     def final_mass(self, legs, /):
+    ...         return bounded_final_mass(legs, self.margin(legs))
+    >>> isinstance(Mima(), LegPredictor)
+    True
     """
 
     def margin(self, legs: Legs, /) -> NDArray[np.float64]:
-        """Return (n,) the estimate of m*/m0: a leg is flyable where it is 1 or more."""
+        """Return (n,) the estimate of m*/m0: a leg is flyable where it is 1 or more.
+
+        Finite and above 0, or NaN: a search works with its logarithm.
+        """
         ...
 
     def final_mass(self, legs: Legs, /) -> NDArray[np.float64]:
-        """Return (n,) kg, the estimate of the mass at arrival with least propellant."""
+        """Return (n,) kg, the estimate of the mass at arrival with least propellant.
+
+        From 0 to the initial mass, or NaN. It may be below the dry mass: such a leg has not
+        enough propellant. Where the margin is below 1, what full thrust all the time would leave.
+        """
         ...
 
 
 @runtime_checkable
 class QuickPredictor(LegPredictor, Protocol):
-    """A predictor that also has cheap answers, a few percent wrong."""
+    """A predictor that also has cheap answers, a few percent wrong.
 
-    def quick_margin(self, legs: Legs, /) -> NDArray[np.float64]:
-        """Return (n,) a cheap estimate of m*/m0; NaN where nothing is known."""
-        ...
-
-
-class _MarginModel(Protocol):
-    def margin(self, legs: Legs, /) -> NDArray[np.float64]: ...
-
-
-@final
-@dataclass(frozen=True)
-class LambertPropellant:
-    """Makes a predictor of anything that knows margins, with Lambert's estimate of final masses.
-
-    Parameters
-    ----------
-    model : object
-        Has a method `margin(legs) -> (n,)`.
+    A search asks for them first, and for the good ones where they decide something. An error
+    of more than a tenth may make it drop a leg that can be flown.
     """
 
-    model: _MarginModel
-
-    def margin(self, legs: Legs, /) -> NDArray[np.float64]:
-        """Return (n,) what the model says."""
-        return self.model.margin(legs)
-
-    def final_mass(self, legs: Legs, /) -> NDArray[np.float64]:
-        """Return (n,) kg, `lambert_final_mass`."""
-        return lambert_final_mass(legs)
+    def quick_margin(self, legs: Legs, /) -> NDArray[np.float64]:
+        """Return (n,) a cheap estimate of m*/m0; otherwise as `margin`."""
+        ...
 
 
 def lambert_final_mass(legs: Legs) -> NDArray[np.float64]:
@@ -78,11 +91,8 @@ def lambert_final_mass(legs: Legs) -> NDArray[np.float64]:
     (n,) float64, kg
         At least the dry mass.
     """
-    v_dep, v_arr = lambert(legs.rv_dep[:, :3], legs.rv_arr[:, :3], legs.tof_s, max_revs=0)
-    delta_v = np.linalg.norm(v_dep[:, 0] - legs.rv_dep[:, 3:], axis=1) + np.linalg.norm(
-        v_arr[:, 0] - legs.rv_arr[:, 3:], axis=1
-    )
-    burnt = legs.m0 * -np.expm1(-np.nan_to_num(delta_v, nan=np.inf) / legs.exhaust_velocity)
+    delta_v = lambert_delta_v(legs.rv_dep, legs.rv_arr, legs.tof_s, max_revs=0)
+    burnt = legs.m0 * -np.expm1(-delta_v / legs.exhaust_velocity)
     most = legs.thrust / legs.exhaust_velocity * legs.tof_s
     estimate: NDArray[np.float64] = np.maximum(legs.m0 - np.minimum(burnt, most), legs.m_dry)
     return estimate

@@ -5,7 +5,7 @@ import tempfile
 from pathlib import Path
 from typing import Any, Final
 
-from feasibility.errors import InputError
+from feasibility.commands.options import add_common, one_or_more
 
 _DESCRIPTION: Final = """\
 Say whether a model is good enough for your spacecraft: draw legs of it, solve
@@ -51,10 +51,9 @@ def add_parser(commands: Any) -> None:
         "--recall", type=float, default=0.99, help="of the pruner that is judged (default: 0.99)"
     )
     parser.add_argument(
-        "--legs", type=int, default=1500, metavar="N", help="legs to solve (default: 1500)"
+        "--legs", type=one_or_more, default=1500, metavar="N", help="legs to solve (default: 1500)"
     )
-    parser.add_argument("--seed", type=int, default=0, help="seed of the draws (default: 0)")
-    parser.add_argument("--workers", type=int, help="processes (default: one a core)")
+    add_common(parser, seed="the draws")
     parser.add_argument("--out", metavar="FILE", help="write all figures as JSON")
     parser.set_defaults(run=run)
 
@@ -74,7 +73,6 @@ def run(options: argparse.Namespace) -> int:
     from feasibility.spacecraft.legs import make, parts_of
     from feasibility.spacecraft.spacecraft_file import read_spacecraft
 
-    check_numbers(options, "legs", "workers")
     craft = read_spacecraft(options.spacecraft)
     classifier = FeasibilityClassifier.load(options.model)
     classifier.threshold(options.recall)
@@ -98,13 +96,3 @@ def run(options: argparse.Namespace) -> int:
         write_json(Path(options.out), record)
         print(f"wrote {options.out}")
     return 0
-
-
-def check_numbers(options: argparse.Namespace, *names: str) -> None:
-    """Raise InputError where a count is not positive or the seed is negative."""
-    for name in names:
-        value = getattr(options, name)
-        if value is not None and value < 1:
-            raise InputError(f"--{name.replace('_', '-')} {value}: expected one or more")
-    if options.seed < 0:
-        raise InputError(f"--seed {options.seed}: expected zero or more")

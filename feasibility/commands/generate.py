@@ -1,5 +1,6 @@
-"""What ``feasibility generate`` does: check, make the missing shards, report."""
+"""The command ``feasibility generate``: check, make the missing shards, report."""
 
+import argparse
 import importlib
 import sys
 import time
@@ -7,26 +8,52 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, Executor
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, Final
 
-from feasibility.dataset.generate import Generation, begin
-from feasibility.dataset.protocol import read_protocol
+from feasibility.commands.options import add_common, one_or_more
 from feasibility.errors import InputError, MissingDependencyError
 from feasibility.runtime.workers import default_workers, worker_pool
-from feasibility.sims_flanagan.fast.compilation import compile_kernels
+
+if TYPE_CHECKING:
+    from feasibility.dataset import Generation
+
+_DESCRIPTION: Final = """\
+Draw legs and label each with its maximum initial mass m*: the leg can be flown
+with every initial mass up to m*. The result is a folder of Parquet files with
+a metadata.json that says how it was made and what each column means.
+
+The rows depend on the protocol, the catalogue and the seed alone, not on the
+number of workers; a larger dataset begins with the rows of a smaller one.
+Run the command again to go on after an interruption, or with more --legs to
+enlarge a dataset.
+"""
 
 
-def run_generate(
-    protocol_name: str,
-    *,
-    legs: int,
-    out: Path,
-    seed: int,
-    workers: int | None,
-    catalogue: str | None,
-    scheduler: str | None,
-) -> int:
-    """Generate or complete a dataset as the command line asks for it; return the exit code.
+def add_parser(commands: Any) -> None:
+    """Add the command to the parser's sub-commands."""
+    parser = commands.add_parser(
+        "generate",
+        help="draw and label legs",
+        description=_DESCRIPTION,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("protocol", help="name of a built-in protocol, or a TOML file")
+    parser.add_argument("--legs", type=one_or_more, required=True, metavar="N", help="rows in all")
+    parser.add_argument("--out", required=True, metavar="DIR", help="folder of the dataset")
+    add_common(parser, seed="the draws")
+    parser.add_argument(
+        "--catalogue", metavar="FILE", help="asteroid table (default: a synthetic main belt)"
+    )
+    parser.add_argument(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="use a running Dask cluster, such as tcp://host:8786, instead of own processes",
+    )
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Do what the command line asks for and return the exit code.
 
     0: complete; 1: a worker died; 130: interrupted. After 1 and 130 the same
     command goes on from the finished shards.
@@ -38,11 +65,12 @@ def run_generate(
     MissingDependencyError
         pyarrow, or for a scheduler dask, is not installed.
     """
-    if workers is not None and workers < 1:
-        raise InputError(f"--workers {workers}: expected one or more")
-    protocol = read_protocol(protocol_name)
-    if catalogue is not None:
-        protocol = protocol.with_catalogue(catalogue)
+    from feasibility.dataset import begin, read_protocol
+
+    legs, seed, out = options.legs, options.seed, Path(options.out)
+    protocol = read_protocol(options.protocol)
+    if options.catalogue is not None:
+        protocol = protocol.with_catalogue(options.catalogue)
     generation = begin(protocol, legs, out, seed=seed)
     missing = generation.legs_missing
     print(
@@ -58,11 +86,9 @@ def run_generate(
         done += rows
 
     try:
-        with _executor(min(workers or default_workers(), len(generation.tasks)), scheduler) as (
-            executor,
-            in_flight,
-        ):
-            _run(generation, executor, in_flight, on_shard)
+        workers = min(options.workers or default_workers(), len(generation.tasks))
+        with _executor(workers, options.scheduler) as (executor, in_flight):
+            _make(generation, executor, in_flight, on_shard)
     except KeyboardInterrupt:
         print(_unfinished("interrupted", legs - missing + done, legs), file=sys.stderr)
         return 130
@@ -76,8 +102,8 @@ def run_generate(
     return 0
 
 
-def _run(
-    generation: Generation,
+def _make(
+    generation: "Generation",
     executor: Executor | None,
     in_flight: int,
     on_shard: Callable[[int], None],
@@ -107,6 +133,8 @@ def _unfinished(what: str, done: int, legs: int) -> str:
 def _executor(workers: int, scheduler: str | None) -> Iterator[tuple[Executor | None, int]]:
     """Yield the executor and how many shards to have at work on it."""
     if scheduler is None:
+        from feasibility.sims_flanagan.fast.compilation import compile_kernels
+
         compile_kernels()
         with worker_pool(max(workers, 1)) as pool:
             yield pool, 2 * workers

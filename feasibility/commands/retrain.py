@@ -5,7 +5,7 @@ import time
 from pathlib import Path
 from typing import Any, Final
 
-from feasibility.commands.assess import check_numbers
+from feasibility.commands.options import add_common, one_or_more
 from feasibility.errors import InputError
 from feasibility.runtime.folders import make_folder
 from feasibility.runtime.workers import default_workers
@@ -67,11 +67,12 @@ def add_parser(commands: Any) -> None:
         ("epochs", 15, "passes of the fine-tuning over the legs"),
     ):
         parser.add_argument(
-            f"--{name}", type=int, default=default, metavar="N", help=f"{text} ({default})"
+            f"--{name}", type=one_or_more, default=default, metavar="N", help=f"{text} ({default})"
         )
-    parser.add_argument("--seed", type=int, default=0, help="seed of everything (0)")
-    parser.add_argument("--workers", type=int, help="processes of the solver (one a core)")
-    parser.add_argument("--threads", type=int, help="threads of the training (one a core)")
+    add_common(parser, seed="everything", workers="processes of the solver")
+    parser.add_argument(
+        "--threads", type=one_or_more, help="threads of the training (default: one a core)"
+    )
     parser.add_argument(
         "--device", choices=("cpu", "cuda", "auto"), default="auto", help="where it trains (auto)"
     )
@@ -92,7 +93,6 @@ def run(options: argparse.Namespace) -> int:
     from feasibility.spacecraft.spacecraft_file import read_spacecraft
 
     counts = ("legs", "test_legs", "general_legs", "general_test_legs", "epochs")
-    check_numbers(options, *counts, "workers", "threads")
     craft = read_spacecraft(options.spacecraft)
     out = Path(options.out)
     if not out.parent.is_dir():

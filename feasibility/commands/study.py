@@ -5,6 +5,7 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+from feasibility.commands.options import add_common, one_or_more
 from feasibility.errors import InputError
 from feasibility.learning.paper.models.precision import PRECISIONS
 from feasibility.runtime.workers import default_workers
@@ -65,11 +66,10 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     parser.add_argument(
         "--catalogue", metavar="FILE", help="asteroid table (default: a synthetic main belt)"
     )
-    parser.add_argument("--seed", type=int, default=0, help="seed of legs and split (default: 0)")
-    parser.add_argument("--workers", type=int, help="processes (default: one a core)")
+    add_common(parser, seed="legs and split")
     parser.add_argument(
         "--threads",
-        type=int,
+        type=one_or_more,
         help="threads of a network (default: one in bfloat16, else one a core)",
     )
     parser.add_argument(
@@ -112,13 +112,6 @@ def _run(options: argparse.Namespace) -> int:
 def _settings(options: argparse.Namespace, out: Path) -> "Settings":
     from feasibility.study.runner import Settings
 
-    cores = default_workers()
-    for name in ("workers", "threads"):
-        value = getattr(options, name)
-        if value is not None and value < 1:
-            raise InputError(f"--{name} {value}: expected one or more")
-    if options.seed < 0:
-        raise InputError(f"--seed {options.seed}: expected zero or more")
     if options.data is not None and options.catalogue is not None:
         raise InputError(
             "--data and --catalogue: expected one of them; the legs are there already"
@@ -129,7 +122,7 @@ def _settings(options: argparse.Namespace, out: Path) -> "Settings":
         data=None if options.data is None else Path(options.data),
         catalogue=options.catalogue,
         seed=options.seed,
-        workers=options.workers or cores,
+        workers=options.workers or default_workers(),
         threads=options.threads,
         device=options.device,
         precision=options.precision,

@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
+from feasibility.commands.options import add_common
 from feasibility.errors import InputError
 
 _DESCRIPTION: Final = """\
@@ -27,7 +28,7 @@ datasets have propellant = true in their protocol.
   feasibility train data/flown --model final-mass --start any.seqmodel --out whole.seqmodel
   feasibility train data/table1 --preset dnn1 --out dnn1.seqmodel
   feasibility train data/table1 --model ensemble --balance adasyn
-  seqsearch run gtoc7 --pruner dnn1.seqmodel:0.99
+  seqsearch run mission.toml --pruner dnn1.seqmodel:0.99
 """
 
 _MODELS: Final = ("margin", "final-mass", "dnn", "ensemble", "knn", "svm", "tree")
@@ -81,7 +82,7 @@ def add_parser(commands: Any) -> None:
     parser.add_argument(
         "--start", metavar="FILE", help='margin model that final-mass is added to, or "default"'
     )
-    parser.add_argument("--seed", type=int, default=0, help="seed of everything (default: 0)")
+    add_common(parser, seed="everything", workers=None)
     parser.add_argument(
         "--out", metavar="FILE", help="the model (default: MODEL.seqmodel, or PRESET.seqmodel)"
     )
@@ -98,8 +99,6 @@ def run(options: argparse.Namespace) -> int:
     """
     if options.preset is not None and options.model not in (None, "dnn"):
         raise InputError(f"--preset {options.preset}: is a dnn, but --model is {options.model}")
-    if options.seed < 0:
-        raise InputError(f"--seed {options.seed}: expected zero or more")
     name = options.preset or options.model or "dnn"
     out = Path(options.out or f"{name}.seqmodel")
     if not out.parent.is_dir():

@@ -7,7 +7,7 @@ from feasibility.dataset.columns import COLUMNS, Column
 from feasibility.dataset.dataset import Dataset, read_dataset
 from feasibility.dataset.generate import Generation, begin
 from feasibility.dataset.protocol import Protocol, builtin_protocols, read_protocol
-from feasibility.dataset.splits import split_by_pair
+from feasibility.dataset.splits import pair_ids, split_by_pair, split_pairs
 
 __all__ = [
     "COLUMNS",
@@ -17,7 +17,9 @@ __all__ = [
     "Protocol",
     "begin",
     "builtin_protocols",
+    "pair_ids",
     "read_dataset",
     "read_protocol",
     "split_by_pair",
+    "split_pairs",
 ]

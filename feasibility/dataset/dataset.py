@@ -64,19 +64,27 @@ class Dataset:
         return known
 
     @property
-    def feasible(self) -> NDArray[np.bool_]:
-        """(n,) the label: whether the leg can be flown.
+    def flyable(self) -> NDArray[np.bool_]:
+        """(n,) whether the leg can be flown, whatever mass is left: what classifiers learn.
 
-        By margin: m0 <= m*, and not found to end below the dry mass (which is
-        only known where the protocol asks for the propellant). By convergence:
-        the one start converged. False where `labelled` is.
+        By margin: m0 <= m*. By convergence: the one start converged. False where
+        `labelled` is.
         """
-        status = self.columns["status"]
         if self.metadata["protocol"]["label"] == "convergence":
-            return np.asarray(status == Status.CONVERGED)
-        # A comparison with NaN is false: unlabelled rows are not feasible.
-        flyable = self.columns["log_margin"] >= 0.0
-        feasible: NDArray[np.bool_] = flyable & (status != Status.BELOW_DRY_MASS)
+            return np.asarray(self.columns["status"] == Status.CONVERGED)
+        # A comparison with NaN is false: unlabelled rows are not flyable.
+        return np.asarray(self.columns["log_margin"] >= 0.0)
+
+    @property
+    def feasible(self) -> NDArray[np.bool_]:
+        """(n,) whether the leg is `flyable` and not found to end below the dry mass.
+
+        Of legs labelled by margin the mass at the end is only known where the protocol asks for
+        the propellant.
+        """
+        feasible: NDArray[np.bool_] = self.flyable & (
+            self.columns["status"] != Status.BELOW_DRY_MASS
+        )
         return feasible
 
     def take(self, rows: ArrayLike) -> "Dataset":

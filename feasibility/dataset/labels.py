@@ -13,10 +13,10 @@ from feasibility.dataset.columns import ARRIVAL_STATE, DEPARTURE_STATE
 from feasibility.dataset.convergence import converge_from_random_start
 from feasibility.dataset.protocol import CatalogueTable, Protocol
 from feasibility.dataset.samplers.draws import Columns, Draw
-from feasibility.dataset.samplers.impulsive import lowest_delta_v
 from feasibility.errors import InputError
 from feasibility.legs import Legs
 from feasibility.orbits import Catalogue, read_catalogue, synthetic_main_belt
+from feasibility.orbits.lambert import lambert_delta_v
 from feasibility.sims_flanagan import Status, optimise, solve_max_initial_mass
 
 LAMBERT_REVOLUTIONS: Final = 2
@@ -114,12 +114,11 @@ def make_shard(task: ShardTask) -> Columns:
     else:
         labels = _margin_labels(draw, protocol, chosen, log_ratio)
     legs: Legs = labels.pop("legs")
+    delta_v = lambert_delta_v(legs.rv_dep, legs.rv_arr, legs.tof_s, LAMBERT_REVOLUTIONS)
     return {
         **_leg_columns(legs, task),
         "dt_imp_days": draw.dt_imp_days,
-        "lambert_dv_m_s": lowest_delta_v(
-            legs.rv_dep, legs.rv_arr, legs.tof_days, LAMBERT_REVOLUTIONS
-        ),
+        "lambert_dv_m_s": np.where(np.isfinite(delta_v), delta_v, np.nan),
         **labels,
     }
 

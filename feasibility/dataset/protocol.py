@@ -2,21 +2,23 @@
 
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Any, Literal, final
+from typing import TYPE_CHECKING, Annotated, Any, Literal, final
 
 import msgspec
 from msgspec import Meta
 
-from feasibility.dataset.samplers.any_spacecraft import AnySpacecraft
 from feasibility.dataset.samplers.impulsive import ImpulsiveGrid
-from feasibility.dataset.samplers.random_pairs import RandomPairs
-from feasibility.dataset.samplers.search_candidates import SearchCandidates
+from feasibility.dataset.samplers.make import NamedSampler
+from feasibility.dataset.samplers.protocol import Sampler
 from feasibility.errors import InputError
 from feasibility.legs import Spacecraft
 from feasibility.runtime.toml_file import decode_toml, read_toml
 
-Sampler = RandomPairs | SearchCandidates | AnySpacecraft
-"""The samplers; a TOML file chooses by ``kind`` in its table ``[sampler]``."""
+if TYPE_CHECKING:
+    _Sampler = Sampler
+else:
+    # A file names one of ours; a caller may hand over any other.
+    _Sampler = NamedSampler
 
 
 class _Table(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -49,10 +51,10 @@ class Protocol(_Table, frozen=True, kw_only=True):
     ----------
     name, description : str
         For people.
-    sampler : RandomPairs, SearchCandidates or AnySpacecraft
-        What draws the legs.
+    sampler : Sampler
+        What draws the legs: a `NamedSampler`, or one of your own.
     spacecraft : SpacecraftTable, optional
-        The one spacecraft; needed by all samplers but "any-spacecraft", which draws its own.
+        The one spacecraft; needed by samplers that do not draw their own.
     catalogue : CatalogueTable
         The bodies.
     impulsive_grid : ImpulsiveGrid
@@ -81,18 +83,15 @@ class Protocol(_Table, frozen=True, kw_only=True):
     boundary_share: Annotated[float, Meta(ge=0, le=1)] = 0.0
     boundary_sigma: Annotated[float, Meta(gt=0)] = 0.05
     legs_per_shard: Annotated[int, Meta(ge=1)] = 2000
-    sampler: Sampler
+    sampler: _Sampler
     spacecraft: SpacecraftTable | None = None
     catalogue: CatalogueTable = msgspec.field(default_factory=CatalogueTable)
     impulsive_grid: ImpulsiveGrid = msgspec.field(default_factory=ImpulsiveGrid)
 
     def __post_init__(self) -> None:
-        draws_spacecraft = isinstance(self.sampler, AnySpacecraft)
-        if draws_spacecraft and self.spacecraft is not None:
-            raise ValueError(
-                'the sampler "any-spacecraft" draws its own; expected no [spacecraft]'
-            )
-        if isinstance(self.sampler, AnySpacecraft):
+        if self.sampler.draws_spacecraft:
+            if self.spacecraft is not None:
+                raise ValueError("this sampler draws its own; expected no [spacecraft]")
             return
         if self.spacecraft is None:
             raise ValueError("no table [spacecraft], which this sampler needs")
@@ -116,6 +115,9 @@ class Protocol(_Table, frozen=True, kw_only=True):
     def to_dict(self) -> dict[str, Any]:
         """Return every setting as plain data, as JSON and TOML have it."""
         plain: dict[str, Any] = msgspec.to_builtins(self)
+        kind = type(self.sampler)
+        # Structs with a tag write it themselves; other samplers are told apart by their class.
+        plain["sampler"] = {"kind": f"{kind.__module__}.{kind.__qualname__}"} | plain["sampler"]
         return plain
 
 

@@ -13,7 +13,7 @@ from feasibility.classifier.classifier import FeasibilityClassifier
 from feasibility.dataset import Dataset
 from feasibility.evaluation.metrics import Confusion, reliability, roc_curve, summary
 from feasibility.evaluation.peers import Peer, PeerOutcome, ask, near_boundary
-from feasibility.learning.paper.train import labels
+from feasibility.evaluation.tables import markdown_table
 from feasibility.runtime.atomic import atomic_path, write_json, write_text
 from feasibility.runtime.folders import make_folder
 from feasibility.runtime.provenance import provenance
@@ -83,24 +83,29 @@ class Evaluation:
 
     def table(self) -> str:
         """Return the figures as Markdown."""
-        lines = ["| measure | value |", "|---|---|"]
-        lines += [f"| {name} | {_number(value)} |" for name, value in self.metrics.items()]
-        lines += ["", "| recall asked | threshold | recall met | infeasible pruned |"]
-        lines += ["|---|---|---|---|"]
-        lines += [
-            f"| {row['recall_asked']:g} | {row['threshold']:.4g} | {row['recall']:.4f} | "
-            f"{row['infeasible_pruned']:.4f} |"
-            for row in self.pruning
+        tables = [
+            markdown_table(
+                ["measure", "value"],
+                [[name, _number(value)] for name, value in self.metrics.items()],
+            ),
+            markdown_table(
+                ["recall asked", "threshold", "recall met", "infeasible pruned"],
+                [
+                    [
+                        f"{row['recall_asked']:g}",
+                        f"{row['threshold']:.4g}",
+                        f"{row['recall']:.4f}",
+                        f"{row['infeasible_pruned']:.4f}",
+                    ]
+                    for row in self.pruning
+                ],
+            ),
         ]
         if self.peers:
-            lines += ["", f"| side by side | {' | '.join(SIDE_BY_SIDE)} |"]
-            lines += ["|---" * (len(SIDE_BY_SIDE) + 1) + "|"]
-            rows = [("this model", self.metrics), *((p.name, p.metrics) for p in self.peers)]
-            lines += [
-                f"| {name} | " + " | ".join(_entry(metrics, key) for key in SIDE_BY_SIDE) + " |"
-                for name, metrics in rows
-            ]
-        return "\n".join(lines) + "\n"
+            models = [("this model", self.metrics), *((p.name, p.metrics) for p in self.peers)]
+            rows = [[name, *_entries(metrics, SIDE_BY_SIDE)] for name, metrics in models]
+            tables.append(markdown_table(["side by side", *SIDE_BY_SIDE], rows))
+        return "\n\n".join(tables) + "\n"
 
     def to_dict(self) -> dict[str, Any]:
         """Return all figures as plain data."""
@@ -178,7 +183,7 @@ def evaluate(
         The dataset has only one class.
     """
     part = dataset.take(np.flatnonzero(dataset.labelled))
-    y = labels(part)
+    y = part.flyable
     classifier.assess(part.legs.take([0]))  # compiles what there is to compile
     began = time.process_time()
     probability, inside = classifier.assess(part.legs)
@@ -232,19 +237,20 @@ def by_family(evaluations: Mapping[str, Evaluation]) -> str:
     evaluations : mapping of str to Evaluation
         By the name of the dataset.
     """
-    lines = [f"| family | {' | '.join(BY_FAMILY)} |", "|---" * (len(BY_FAMILY) + 1) + "|"]
-    for name, evaluation in evaluations.items():
-        shown = " | ".join(_entry(evaluation.metrics, key) for key in BY_FAMILY)
-        lines.append(f"| {name} | {shown} |")
+    tables = [
+        markdown_table(
+            ["family", *BY_FAMILY],
+            [[name, *_entries(one.metrics, BY_FAMILY)] for name, one in evaluations.items()],
+        )
+    ]
     peers = [peer.name for peer in next(iter(evaluations.values())).peers]
     if peers:
-        lines += ["", f"| balanced accuracy | this model | {' | '.join(peers)} |"]
-        lines += ["|---" * (len(peers) + 2) + "|"]
-        for name, evaluation in evaluations.items():
-            all_metrics = [evaluation.metrics, *(peer.metrics for peer in evaluation.peers)]
-            shown = " | ".join(_entry(metrics, "balanced_accuracy") for metrics in all_metrics)
-            lines.append(f"| {name} | {shown} |")
-    return "\n".join(lines) + "\n"
+        rows = []
+        for name, one in evaluations.items():
+            models = [one.metrics, *(peer.metrics for peer in one.peers)]
+            rows.append([name, *(_entry(metrics, "balanced_accuracy") for metrics in models)])
+        tables.append(markdown_table(["balanced accuracy", "this model", *peers], rows))
+    return "\n\n".join(tables) + "\n"
 
 
 def _pruning(
@@ -278,6 +284,10 @@ def _plot_margins(
         xlim=(-1, 1), ylim=(-1, 1), xlabel="log(m*/m0), solved", ylabel="log(m*/m0) by the model"
     )
     _save(figure, axes, path)
+
+
+def _entries(metrics: Mapping[str, float], keys: Sequence[str]) -> list[str]:
+    return [_entry(metrics, key) for key in keys]
 
 
 def _entry(metrics: Mapping[str, float], key: str) -> str:

@@ -17,12 +17,13 @@ from numpy.typing import NDArray
 from feasibility.constants import MU_SUN
 from feasibility.evaluation.metrics import Confusion, auc
 from feasibility.legs import Legs
-from feasibility.orbits.mima import lambert_delta_v, mima, mima2
+from feasibility.orbits.lambert import lambert_delta_v
+from feasibility.orbits.mima import mima, mima2
 
 _Array = NDArray[np.float64]
 
 MAX_REVS: Final = 2
-"""Closed forms take their best Lambert branch of so many revolutions."""
+"""Closed forms take their best Lambert branch of up to this many revolutions."""
 
 NEURAL: Final = "neural_lowthrust"
 """Name of the package of Zhang et al. 2026 on PyPI, a net for any spacecraft."""
@@ -89,7 +90,7 @@ def ask(peer: Peer, legs: Legs, y: NDArray[np.bool_], log_margin: _Array) -> Pee
     Parameters
     ----------
     peer : Peer
-        Whom to ask.
+        The one that answers.
     legs : Legs
         n legs.
     y : (n,) bool
@@ -102,8 +103,8 @@ def ask(peer: Peer, legs: Legs, y: NDArray[np.bool_], log_margin: _Array) -> Pee
     # A NaN is no answer; what cannot be computed is not flown.
     score = np.nan_to_num(peer.score(legs), nan=-np.inf, posinf=np.inf, neginf=-np.inf)
     seconds = time.process_time() - began
-    said = score >= 0.0
-    counts = Confusion.of(y, said)
+    answers = score >= 0.0
+    counts = Confusion.of(y, answers)
     metrics = {
         "accuracy": counts.accuracy,
         "precision": counts.precision,
@@ -112,7 +113,7 @@ def ask(peer: Peer, legs: Legs, y: NDArray[np.bool_], log_margin: _Array) -> Pee
         "f10": counts.f_score(10.0),
         "auc": auc(y, score),
         "balanced_accuracy": counts.balanced_accuracy,
-        **near_boundary(said == y, log_margin),
+        **near_boundary(answers == y, log_margin),
         "us_per_leg": 1e6 * seconds / len(legs),
     }
     return PeerOutcome(peer.name, score, metrics)

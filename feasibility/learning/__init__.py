@@ -1,6 +1,5 @@
-"""Learning: features, models, balance, tuning and the artefact that a search loads.
+"""Training: the margin model and the paper's five classifiers, from datasets to models as files.
 
-Floor 5 of the house. Training needs the extra ``train`` (torch, scikit-learn,
-imbalanced-learn, optuna), imported where it is used; features, artefacts and
-prediction from them need numpy, scipy and numba alone.
+Needs the extra ``train`` (torch, scikit-learn, imbalanced-learn, optuna), imported where it is
+used. Asking the models that come of it needs none of them: `feasibility.classifier`.
 """

@@ -5,11 +5,10 @@ is cheap; the compiled kernels are loaded when they are first used.
 """
 
 from feasibility.orbits.catalogue import Catalogue
+from feasibility.orbits.classical import cartesian_to_classical, classical_to_cartesian
 from feasibility.orbits.earth import earth
-from feasibility.orbits.elements import (
-    cartesian_to_classical,
+from feasibility.orbits.equinoctial import (
     cartesian_to_equinoctial,
-    classical_to_cartesian,
     classical_to_equinoctial,
     equinoctial_to_cartesian,
     equinoctial_to_classical,

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from feasibility.constants import DAY_S, MU_SUN
 from feasibility.errors import InputError
-from feasibility.orbits.elements import perifocal_axes
+from feasibility.orbits.classical import perifocal_axes
 
 
 @final

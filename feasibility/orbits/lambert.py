@@ -1,4 +1,4 @@
-"""Lambert's problem for a batch of legs."""
+"""Lambert's problem for a batch of legs, and the velocity change that its arcs cost."""
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -57,7 +57,7 @@ def lambert(
     """
     from feasibility.orbits.lambert_kernels import lambert_batch
 
-    start, end = _positions("r1", r1), _positions("r2", r2)
+    start, end = _vectors("r1", r1, 3), _vectors("r2", r2, 3)
     times = np.ascontiguousarray(tof_s, dtype=np.float64)
     if len(start) != len(end) or times.shape != (len(start),):
         raise InputError(
@@ -69,8 +69,43 @@ def lambert(
     return lambert_batch(start, end, times, int(max_revs), float(mu))
 
 
-def _positions(name: str, value: ArrayLike) -> NDArray[np.float64]:
+def lambert_delta_v(
+    rv_dep: ArrayLike, rv_arr: ArrayLike, tof_s: ArrayLike, max_revs: int = 2, mu: float = MU_SUN
+) -> NDArray[np.float64]:
+    """Return the least sum of both impulses over all branches.
+
+    Parameters
+    ----------
+    rv_dep, rv_arr : array_like
+        (n, 6) float64, m and m/s: states at departure and arrival.
+    tof_s : array_like
+        (n,) s, or one value: time of flight.
+    max_revs : int
+        Largest number of complete revolutions.
+    mu : float
+        Gravitational parameter in m3/s2.
+
+    Returns
+    -------
+    (n,) float64, m/s
+        inf where no branch exists.
+
+    Raises
+    ------
+    InputError
+        The shapes do not fit, or `max_revs` is negative.
+    """
+    start, end = _vectors("rv_dep", rv_dep, 6), _vectors("rv_arr", rv_arr, 6)
+    times = np.full(len(start), tof_s) if np.ndim(tof_s) == 0 else tof_s
+    v1, v2 = lambert(start[:, :3], end[:, :3], times, max_revs, mu)
+    impulses = np.linalg.norm(v1 - start[:, None, 3:], axis=2)
+    impulses += np.linalg.norm(end[:, None, 3:] - v2, axis=2)
+    least: NDArray[np.float64] = np.where(np.isnan(impulses), np.inf, impulses).min(axis=1)
+    return least
+
+
+def _vectors(name: str, value: ArrayLike, size: int) -> NDArray[np.float64]:
     array = np.ascontiguousarray(value, dtype=np.float64)
-    if array.ndim != 2 or array.shape[1] != 3:
-        raise InputError(f"lambert {name}: expected shape (n, 3), got {array.shape}")
+    if array.ndim != 2 or array.shape[1] != size:
+        raise InputError(f"lambert {name}: expected shape (n, {size}), got {array.shape}")
     return array

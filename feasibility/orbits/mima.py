@@ -1,4 +1,4 @@
-"""Estimates of the maximum initial mass and of the delta-v of legs, from Lambert arcs.
+"""Estimates of the maximum initial mass of legs, from Lambert arcs.
 
 With n the number of legs and b = 1 + 2 `max_revs` the number of Lambert branches.
 """
@@ -8,7 +8,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from feasibility.constants import MU_SUN
 from feasibility.errors import InputError
-from feasibility.orbits.lambert import lambert
 
 
 def mima(
@@ -104,27 +103,6 @@ def mima2_branches(
 ) -> NDArray[np.float64]:
     """Return MIMA2 on each branch: (n, b) kg, NaN where the branch does not exist. See `mima2`."""
     return _masses(rv_dep, rv_arr, tof_s, thrust, exhaust_velocity, max_revs, mu, refined=True)
-
-
-def lambert_delta_v(
-    rv_dep: ArrayLike, rv_arr: ArrayLike, tof_s: ArrayLike, max_revs: int = 2, mu: float = MU_SUN
-) -> NDArray[np.float64]:
-    """Return the least sum of both impulses over all Lambert branches.
-
-    Parameters and errors as for `mima`.
-
-    Returns
-    -------
-    (n,) float64, m/s
-        inf where no branch exists.
-    """
-    start, end = _states("rv_dep", rv_dep), _states("rv_arr", rv_arr)
-    times = _column("tof_s", tof_s, len(start))
-    v1, v2 = lambert(start[:, :3], end[:, :3], times, max_revs, mu)
-    impulses = np.linalg.norm(v1 - start[:, None, 3:], axis=2)
-    impulses += np.linalg.norm(end[:, None, 3:] - v2, axis=2)
-    least: NDArray[np.float64] = np.where(np.isnan(impulses), np.inf, impulses).min(axis=1)
-    return least
 
 
 def _best(masses: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -75,8 +75,7 @@ from feasibility.pruners.check import check_pruner
 from feasibility.pruners.classifier import ClassifierPruner
 from feasibility.pruners.keep_all import KeepAll
 from feasibility.pruners.lambert import LambertPruner
-from feasibility.pruners.mima import MimaPruner
-from feasibility.pruners.mima2 import Mima2Pruner
+from feasibility.pruners.mima import Mima2Pruner, MimaPruner
 from feasibility.pruners.protocol import Pruner
 
 __all__ = [

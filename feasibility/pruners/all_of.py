@@ -24,7 +24,8 @@ class Survivors:
     unknown : (n,) bool
         True where it does, and a classifier kept it for not knowing it.
     pruned : dict of str to int
-        How many legs each pruner dropped, as `AllOf.keep_with_counts` has it.
+        How many legs each pruner dropped, by its name, in the order in which they were
+        asked; the second pruner of the same name is called ``name-2``, and so on.
     """
 
     mask: NDArray[np.bool_]
@@ -70,31 +71,13 @@ class AllOf:
         found = self.survivors(legs)
         return found.mask, found.unknown
 
-    def keep_with_counts(self, legs: Legs, /) -> tuple[NDArray[np.bool_], dict[str, int]]:
-        """Return the mask of `keep` and how many legs each pruner dropped.
-
-        Returns
-        -------
-        mask : (n,) bool
-        pruned : dict of str to int
-            By pruner name, in the order in which they were asked; the second
-            pruner of the same name is called ``name-2``, and so on.
-
-        Raises
-        ------
-        PrunerContractError
-            A pruner raised, or returned something else than a boolean a leg.
-        """
-        found = self.survivors(legs)
-        return found.mask, found.pruned
-
     def survivors(self, legs: Legs, /) -> Survivors:
         """Return what survives, what of it is not known, and who dropped how many, at once.
 
         Raises
         ------
         PrunerContractError
-            As for `keep_with_counts`.
+            A pruner raised, or returned something else than a boolean a leg.
         """
         mask = np.ones(len(legs), dtype=np.bool_)
         unknown = np.zeros(len(legs), dtype=np.bool_)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from feasibility.errors import InputError
 from feasibility.legs import Legs
-from feasibility.orbits.mima import lambert_delta_v
+from feasibility.orbits.lambert import lambert_delta_v
 
 
 @final

@@ -1,5 +1,6 @@
-"""`MimaPruner`: the initial mass against MIMA."""
+"""`MimaPruner` and `Mima2Pruner`: the initial mass against a closed-form largest one."""
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import final
 
@@ -8,12 +9,35 @@ from numpy.typing import NDArray
 
 from feasibility.errors import InputError
 from feasibility.legs import Legs
-from feasibility.orbits.mima import mima
+from feasibility.orbits.mima import mima, mima2
+
+
+@dataclass(frozen=True)
+class _LargestMassPruner(ABC):
+    """Keeps a leg whose estimated largest initial mass is at least `margin` times its mass."""
+
+    margin: float = 1.0
+    max_revs: int = 2
+
+    def __post_init__(self) -> None:
+        kind = type(self).__name__
+        if not self.margin > 0:
+            raise InputError(f"{kind} margin: {self.margin}, expected more than zero")
+        if self.max_revs < 0:
+            raise InputError(f"{kind} max_revs: {self.max_revs}, expected zero or more")
+
+    @abstractmethod
+    def _largest_mass(self, legs: Legs) -> NDArray[np.float64]:
+        """Return the estimate, (n,) kg."""
+
+    def keep(self, legs: Legs, /) -> NDArray[np.bool_]:
+        """Return (n,) bool, True where the leg survives."""
+        return self._largest_mass(legs) >= self.margin * legs.m0
 
 
 @final
 @dataclass(frozen=True)
-class MimaPruner:
+class MimaPruner(_LargestMassPruner):
     """Keeps a leg whose MIMA is at least `margin` times its initial mass.
 
     Parameters
@@ -39,23 +63,36 @@ class MimaPruner:
     'mima'
     """
 
-    margin: float = 1.0
-    max_revs: int = 2
-
-    def __post_init__(self) -> None:
-        if not self.margin > 0:
-            raise InputError(f"MimaPruner margin: {self.margin}, expected more than zero")
-        if self.max_revs < 0:
-            raise InputError(f"MimaPruner max_revs: {self.max_revs}, expected zero or more")
-
     @property
     def name(self) -> str:
         """Name in counters and reports."""
         return "mima"
 
-    def keep(self, legs: Legs, /) -> NDArray[np.bool_]:
-        """Return (n,) bool, True where the leg survives."""
-        mass = mima(
+    def _largest_mass(self, legs: Legs) -> NDArray[np.float64]:
+        return mima(
             legs.rv_dep, legs.rv_arr, legs.tof_s, legs.thrust, legs.exhaust_velocity, self.max_revs
         )
-        return mass >= self.margin * legs.m0
+
+
+@final
+@dataclass(frozen=True)
+class Mima2Pruner(_LargestMassPruner):
+    """Keeps a leg whose MIMA2, which follows gravity along the arc, is at least `margin` times m0.
+
+    Parameters, errors and source as for `MimaPruner`.
+
+    Examples
+    --------
+    >>> Mima2Pruner(margin=0.95).name
+    'mima2'
+    """
+
+    @property
+    def name(self) -> str:
+        """Name in counters and reports."""
+        return "mima2"
+
+    def _largest_mass(self, legs: Legs) -> NDArray[np.float64]:
+        return mima2(
+            legs.rv_dep, legs.rv_arr, legs.tof_s, legs.thrust, legs.exhaust_velocity, self.max_revs
+        )

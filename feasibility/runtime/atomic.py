@@ -6,9 +6,11 @@ import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from feasibility.errors import InputError
+
+_SUFFIX: Final = ".tmp"
 
 
 @contextmanager
@@ -21,7 +23,9 @@ def atomic_path(path: Path) -> Iterator[Path]:
         The folder cannot be written to or the disk is full; `path` is as before.
     """
     try:
-        descriptor, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
+        descriptor, name = tempfile.mkstemp(
+            prefix=f".{path.name}.", suffix=_SUFFIX, dir=path.parent
+        )
         os.close(descriptor)
     except OSError as error:
         raise InputError(f"{path}: cannot be written ({error.strerror})") from None
@@ -29,12 +33,29 @@ def atomic_path(path: Path) -> Iterator[Path]:
     try:
         yield temporary
         temporary.chmod(0o644)
+        _sync(temporary)
         temporary.replace(path)
     except OSError as error:
         raise InputError(f"{path}: cannot be written ({error.strerror})") from None
     finally:
         with suppress(FileNotFoundError):
             temporary.unlink()
+
+
+def remove_stale(folder: Path) -> None:
+    """Remove temporary files that a killed process left; nobody else may be writing there."""
+    for file in folder.glob(f".*{_SUFFIX}"):
+        with suppress(OSError):
+            file.unlink()
+
+
+def _sync(path: Path) -> None:
+    """Wait until a file is on disk: a rename may get there before what it names."""
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
 
 
 def write_text(path: Path, text: str) -> None:

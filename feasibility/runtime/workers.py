@@ -71,6 +71,15 @@ class MendingPool(Executor):
             self._closed = True
         self._pool.shutdown(wait=wait, cancel_futures=cancel_futures)
 
+    def abandon(self) -> None:
+        """End the workers at once, whatever they are doing."""
+        with self._lock:
+            self._closed = True
+        # Private until Python 3.14 has terminate_workers; without it they end a little later.
+        processes = dict(getattr(self._pool, "_processes", None) or {})
+        for process in processes.values():
+            process.terminate()
+
     def _begin(self, call: "_Call") -> None:
         # No lock is held while a pool is asked: it tells of its end under a lock of its own.
         while True:
@@ -198,6 +207,9 @@ def worker_pool(workers: int) -> Iterator[MendingPool | None]:
     pool = MendingPool(workers)
     try:
         yield pool
+    except KeyboardInterrupt:
+        pool.abandon()
+        raise
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
 

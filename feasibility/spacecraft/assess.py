@@ -1,6 +1,5 @@
 """Whether a model is good enough for a spacecraft, judged on freshly solved legs of it."""
 
-import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, Final, final
@@ -22,7 +21,8 @@ LEAST_OF_A_CLASS: Final = 50
 LEAST_NEAR: Final = 100
 """With fewer legs of a class, or within 15 % of the boundary, nothing is said."""
 
-_NORMAL_95: Final = 1.959964
+CONFIDENCE: Final = 0.95
+"""Probability with which an interval holds the true share."""
 
 
 @final
@@ -33,7 +33,7 @@ class Share:
     Attributes
     ----------
     count, of : int
-        So many of so many.
+        How often it was so, and of how many.
     """
 
     count: int
@@ -46,19 +46,17 @@ class Share:
 
     @property
     def interval(self) -> tuple[float, float]:
-        """Wilson's interval that holds the true share with probability 0.95.
+        """Wilson's interval that holds the true share with probability `CONFIDENCE`.
 
         Wilson 1927, "Probable inference, the law of succession, and statistical inference".
         """
         if not self.of:
             return 0.0, 1.0
-        n, z = self.of, _NORMAL_95
-        centre = (self.value + z * z / (2 * n)) / (1 + z * z / n)
-        spread = z / (1 + z * z / n)
-        spread *= math.sqrt(self.value * (1 - self.value) / n + z * z / (4 * n * n))
-        # At the ends of the scale rounding must not leave the share itself out.
-        low, high = min(centre - spread, self.value), max(centre + spread, self.value)
-        return max(low, 0.0), min(high, 1.0)
+        from scipy.stats import binomtest
+
+        interval = binomtest(self.count, self.of).proportion_ci(CONFIDENCE, method="wilson")
+        # Rounding must not leave the share itself out.
+        return min(float(interval.low), self.value), max(float(interval.high), self.value)
 
     def __str__(self) -> str:
         low, high = self.interval
@@ -109,19 +107,21 @@ class Assessment:
 
     def text(self) -> str:
         """Return the figures and the verdict as lines for people."""
+        from tabulate import tabulate
+
         low, high = self.balanced_interval
-        lines = [
-            f"legs                         {self.legs} solved, {self.unsolved} without m*",
-            f"balanced accuracy            {self.balanced_accuracy:.4f} ({low:.4f} to {high:.4f})",
-            f"within 15 % of the boundary  {self.within_15_percent}",
-            f"within 5 % of the boundary   {self.within_5_percent}",
-            f"in the model's domain        {self.in_domain}",
-            f"recall of the pruner         {self.recall}, {self.recall_asked:g} asked",
-            f"precision of the pruner      {self.precision}",
-            "",
-            f"verdict: {self.verdict}" + "".join(f"\n  {reason}" for reason in self.reasons),
+        rows = [
+            ("legs", f"{self.legs} solved, {self.unsolved} without m*"),
+            ("balanced accuracy", f"{self.balanced_accuracy:.4f} ({low:.4f} to {high:.4f})"),
+            ("within 15 % of the boundary", self.within_15_percent),
+            ("within 5 % of the boundary", self.within_5_percent),
+            ("in the model's domain", self.in_domain),
+            ("recall of the pruner", f"{self.recall}, {self.recall_asked:g} asked"),
+            ("precision of the pruner", self.precision),
         ]
-        return "\n".join(lines) + "\n"
+        table = tabulate(rows, tablefmt="plain", disable_numparse=True)
+        reasons = "".join(f"\n  {reason}" for reason in self.reasons)
+        return f"{table}\n\nverdict: {self.verdict}{reasons}\n"
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything as plain data."""

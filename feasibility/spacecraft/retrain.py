@@ -15,6 +15,7 @@ from feasibility.dataset import Dataset, read_protocol
 from feasibility.dataset.protocol import Protocol
 from feasibility.errors import InputError
 from feasibility.evaluation.evaluate import evaluate
+from feasibility.evaluation.tables import markdown_table
 from feasibility.learning.margin.train import MarginEpoch, MarginRecipe, train_margin
 from feasibility.runtime.atomic import write_json
 from feasibility.runtime.provenance import provenance
@@ -101,20 +102,18 @@ class Retrained:
 
     def table(self) -> str:
         """Return the figures as Markdown."""
-        lines = []
+        parts = []
         for title, figures in (
             ("fresh legs of this spacecraft", self.own),
             ("fresh legs of any spacecraft", self.general),
         ):
-            lines += [f"{title}:", "", "| measure | " + " | ".join(figures) + " |"]
-            lines += ["|---" * (len(figures) + 1) + "|"]
-            for name in _SHOWN:
-                values = [candidate.get(name) for candidate in figures.values()]
-                if None not in values:
-                    shown = " | ".join(f"{value:.5f}" for value in values)
-                    lines.append(f"| {name} | {shown} |")
-            lines.append("")
-        return "\n".join(lines)
+            rows = [
+                [name, *(f"{candidate[name]:.5f}" for candidate in figures.values())]
+                for name in _SHOWN
+                if all(name in candidate for candidate in figures.values())
+            ]
+            parts.append(f"{title}:\n\n{markdown_table(['measure', *figures], rows)}\n")
+        return "\n".join(parts)
 
     def verdict(self) -> str:
         """Return in one sentence what is saved and why."""

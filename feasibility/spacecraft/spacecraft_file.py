@@ -7,7 +7,8 @@ import msgspec
 from msgspec import Meta
 
 from feasibility.dataset.protocol import CatalogueTable, Protocol, SpacecraftTable
-from feasibility.dataset.samplers.random_pairs import RandomPairs, check_ranges
+from feasibility.dataset.samplers.draws import check_ranges
+from feasibility.dataset.samplers.random_pairs import RandomPairs
 from feasibility.dataset.samplers.search_candidates import SearchCandidates
 from feasibility.runtime.toml_file import read_toml
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from feasibility.classifier.paper.features import FEATURE_SET, FEATURES, paper_features
 from feasibility.dataset import Dataset
-from feasibility.dataset.folds import pair_folds, pair_ids, split_pairs
+from feasibility.dataset.splits import pair_ids, split_pairs
 from feasibility.errors import InputError
 from feasibility.learning.paper.balance import balanced_rows
 from feasibility.legs import Legs
@@ -109,7 +109,8 @@ class StudyData:
                 f"dataset of {len(y)} legs, {int(y.sum())} of them flyable: too few of a class "
                 "for training and test; expected some tens of either"
             )
-        folds = pair_folds(pairs[pool], N_FOLDS, np.random.default_rng([seed, _FOLDS]))
+        rng = np.random.default_rng([seed, _FOLDS])
+        folds = split_pairs(pairs[pool], [1.0 / N_FOLDS] * N_FOLDS, rng)
         catalogue = dataset.metadata["catalogue"]
         return cls(
             dataset=rows,

@@ -32,7 +32,7 @@ _SETTINGS: Final = (
 
 
 def margin_recipe(context: Context, legs: int, seed: int) -> MarginRecipe:
-    """Return how the margin model is trained on so many legs: the default model's net.
+    """Return how the margin model is trained on a number of legs: the default model's net.
 
     Large training sets get 8000 steps, small ones 60 epochs; there are at least 12 epochs.
     """

@@ -50,7 +50,7 @@ class Preset:
     comparison_seeds : int
         Table 6: draws of the training set.
     large, large_seeds : int
-        Fig. 3 and Table 6: training sets of this size and above get so many draws at most.
+        Fig. 3 and Table 6: training sets of this size and above get at most this number of draws.
     n_features : tuple of int
         Table 4: numbers of features.
     n_features_rows, n_features_folds : int

@@ -39,5 +39,5 @@ class BestTour:
         if key > state.best_key:
             node = int(deepest.tree_id[best])
             end = state.tree.node(node)
-            state.best_key, state.best_node = key, node
-            state.closing = self._problem.closing(end["row"], end["t_mjd2000"], end["mass"])
+            closing = self._problem.closing(end["row"], end["t_mjd2000"], end["mass"])
+            state.best_key, state.best_node, state.closing = key, node, closing

@@ -94,7 +94,7 @@ class Survey:
 
 @final
 class Forecast:
-    """Asks a predictor about the ways on from nodes.
+    """Asks a predictor which hops lead on from nodes.
 
     Parameters
     ----------

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from feasibility import InputError, MissingDependencyError
+from feasibility.runtime.interrupts import end_output, interrupt_code, interruptible
 from feasibility.sims_flanagan.fast.compilation import prefer_fast_compilation
 from seqsearch.commands import plot, polish, problems, resume, run, verify
 
@@ -30,15 +31,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return the exit code.
 
     0: done (and, for ``verify``, everything holds); 1: verification failed;
-    2: input that cannot be used, with one line on stderr.
+    2: input that cannot be used, with one line on stderr; 130 after Ctrl-C, 143 after SIGTERM.
     """
     prefer_fast_compilation()
     parsed = _parser().parse_args(arguments)
-    try:
-        return int(parsed.run(parsed))
-    except (InputError, MissingDependencyError) as error:
-        print(f"seqsearch: {error}", file=sys.stderr)
-        return 2
+    with interruptible():
+        try:
+            return int(parsed.run(parsed))
+        except (InputError, MissingDependencyError) as error:
+            print(f"seqsearch: {error}", file=sys.stderr)
+            return 2
+        except KeyboardInterrupt:
+            print("seqsearch: interrupted; what was found is saved", file=sys.stderr)
+            return interrupt_code() or 130
+        finally:
+            end_output()
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -30,6 +30,15 @@ def add_limits(command: argparse.ArgumentParser) -> None:
     add_workers(command)
 
 
+def add_catalogue(command: argparse.ArgumentParser) -> None:
+    """Add where the asteroid table of a run is now."""
+    command.add_argument(
+        "--catalogue",
+        metavar="FILE",
+        help="the run's asteroid table, if it is not where it was",
+    )
+
+
 def add_workers(command: argparse.ArgumentParser) -> None:
     """Add the number of processes."""
     command.add_argument("--workers", type=int, help="processes (default: one a core)")

@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from seqsearch.commands.options import add_workers, seconds
+from seqsearch.commands.options import add_catalogue, add_workers, seconds
 
 if TYPE_CHECKING:
     from seqsearch.commands.options import Commands
@@ -33,6 +33,7 @@ def add_parser(commands: "Commands") -> None:
         "--time-limit", metavar="T", help="stop after 90s, 10min, 1h (default: after some rounds)"
     )
     polish.add_argument("--seed", type=int, default=0, help="seed of the moves (default: 0)")
+    add_catalogue(polish)
     add_workers(polish)
     polish.set_defaults(run=_polish)
 
@@ -45,4 +46,5 @@ def _polish(options: argparse.Namespace) -> int:
         time_limit_s=seconds(options.time_limit),
         seed=options.seed,
         workers=options.workers,
+        catalogue=options.catalogue,
     )

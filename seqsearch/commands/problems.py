@@ -4,6 +4,7 @@ import argparse
 from typing import TYPE_CHECKING
 
 from feasibility import InputError
+from feasibility.runtime.interrupts import say
 
 if TYPE_CHECKING:
     from seqsearch.commands.options import Commands
@@ -30,9 +31,9 @@ def _problems(options: argparse.Namespace) -> int:
     texts = builtin_problems()
     if options.name is None:
         for name in texts:
-            print(f"{name:<12} {read_config(name).problem.description}")
+            say(f"{name:<12} {read_config(name).problem.description}")
         return 0
     if options.name not in texts:
         raise InputError(f"{options.name}: no such problem; known are {', '.join(texts)}")
-    print(texts[options.name], end="")
+    say(texts[options.name].rstrip("\n"))
     return 0

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from feasibility import InputError
-from seqsearch.commands.options import add_limits, seconds
+from seqsearch.commands.options import add_catalogue, add_limits, seconds
 
 if TYPE_CHECKING:
     from seqsearch.commands.options import Commands
@@ -34,6 +34,7 @@ def add_parser(commands: "Commands") -> None:
         metavar="PASS:RANK",
         help="go on after this rank, such as 2:5, and drop what came later; 0:0 is the beginning",
     )
+    add_catalogue(resume)
     add_limits(resume)
     resume.set_defaults(run=_resume)
 
@@ -47,6 +48,7 @@ def _resume(options: argparse.Namespace) -> int:
         time_limit_s=seconds(options.time_limit),
         max_solves=options.max_solves,
         workers=options.workers,
+        catalogue=options.catalogue,
     )
 
 

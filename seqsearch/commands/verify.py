@@ -2,12 +2,28 @@
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
+from feasibility.runtime.interrupts import say
 from seqsearch.commands.options import sequence_path
 
 if TYPE_CHECKING:
+    from feasibility.orbits import Catalogue
     from seqsearch.commands.options import Commands
+    from seqsearch.problems.problem_file import Config
+    from seqsearch.tours.checks import Verification
+    from seqsearch.tours.tour import Tour
+
+_DESCRIPTION: Final = """\
+Integrate every leg of a run's tour with scipy's DOP853 between impulses and check end
+states (1000 km, 1 m/s), throttles, masses, stays, duplicates, window, duration and score,
+and what the problem's rules allow besides: launch, fly-bys, masses left behind, groups.
+
+The rules come from the problem, not from the file under test: from the run's config.toml,
+or from --problem. A tour that keeps only the rules in its own file is not verified. With
+the asteroid table at hand (--catalogue, or where config.toml says) bodies are compared with
+it. Exit code 0 if everything holds, else 1.
+"""
 
 
 def add_parser(commands: "Commands") -> None:
@@ -15,39 +31,97 @@ def add_parser(commands: "Commands") -> None:
     verify = commands.add_parser(
         "verify",
         help="check a tour independently",
-        description=(
-            "Integrate every leg of a run's tour with scipy's DOP853 between impulses and check "
-            "end states (1000 km, 1 m/s), throttles, masses, stays, duplicates, window, "
-            "duration and score, and what the problem's rules allow besides: launch, fly-bys, "
-            "masses left behind, groups. Exit code 0 if all hold, else 1."
-        ),
+        description=_DESCRIPTION,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     verify.add_argument("path", metavar="RUN", help="run folder, or a sequence.json")
     verify.add_argument(
-        "--catalogue", metavar="FILE", help="also compare the elements with this table"
+        "--problem",
+        metavar="NAME|FILE",
+        help="whose rules hold (default: the run's config.toml, or the built-in problem of "
+        "the tour's name)",
+    )
+    verify.add_argument(
+        "--catalogue", metavar="FILE", help="compare the bodies with this asteroid table"
     )
     verify.set_defaults(run=_verify)
 
 
 def _verify(options: argparse.Namespace) -> int:
     from feasibility.orbits import read_catalogue
-    from seqsearch.runs.fleet import check_disjoint, is_fleet, read_fleet
+    from seqsearch.runs.fleet import check_disjoint, is_fleet, probe_paths
     from seqsearch.tours.checks import Verification
     from seqsearch.tours.tour_files import read_tour
+
+    path = Path(options.path)
+    catalogue = None if options.catalogue is None else read_catalogue(Path(options.catalogue))
+    fleet = is_fleet(path)
+    paths = probe_paths(path) if fleet else [sequence_path(options.path)]
+    tours = [read_tour(file) for file in paths]
+    passed = [
+        _verified(file, tour, options.problem, catalogue)
+        for file, tour in zip(paths, tours, strict=True)
+    ]
+    if fleet:
+        together = Verification((check_disjoint(tours),))
+        passed.append(together.passed)
+        say(f"{sum(tour.n_asteroids for tour in tours)} asteroids on {len(tours)} probes")
+        say(together.table())
+    say("verified" if all(passed) else "NOT verified")
+    return 0 if all(passed) else 1
+
+
+def _verified(file: Path, tour: "Tour", problem: str | None, table: "Catalogue | None") -> bool:
+    """Check one tour, print how it fares, and return whether everything holds."""
+    from seqsearch.problems.problem_file import table_at_hand
+    from seqsearch.problems.rules_of import differences, rules_of
     from seqsearch.tours.verify import verify_tour
 
-    catalogue = None if options.catalogue is None else read_catalogue(Path(options.catalogue))
-    fleet = is_fleet(Path(options.path))
-    tours = read_fleet(Path(options.path)) if fleet else [read_tour(sequence_path(options.path))]
-    outcomes = [verify_tour(tour, catalogue) for tour in tours]
-    for tour, verification in zip(tours, outcomes, strict=True):
-        print(tour.one_line())
-        print(tour.summary())
-        print(verification.table())
-    if fleet:
-        outcomes.append(Verification((check_disjoint(tours),)))
-        print(f"{sum(tour.n_asteroids for tour in tours)} asteroids on {len(tours)} probes")
-        print(outcomes[-1].table())
-    passed = all(verification.passed for verification in outcomes)
-    print("verified" if passed else "NOT verified")
-    return 0 if passed else 1
+    say(tour.one_line())
+    config, source = _problem_of(file, tour, problem)
+    if config is None:
+        verification = verify_tour(tour, table)
+        _print(verification, file, tour)
+        say(
+            "checked against the rules in its own file alone, which prove nothing; "
+            "say whose rules hold with --problem NAME|FILE"
+        )
+        return False
+    table = table or table_at_hand(config)
+    rules = rules_of(config, tour, table)
+    say(f"rules of problem {rules.name}, from {source}")
+    for difference in differences(tour.rules, rules):
+        say(f"the file states other rules: {difference}")
+    verification = verify_tour(tour, table, rules)
+    passed = _print(verification, file, tour)
+    if not passed and verify_tour(tour, table).passed:
+        say("it keeps only the rules in its own file")
+    return passed
+
+
+def _print(verification: "Verification", file: Path, tour: "Tour") -> bool:
+    from seqsearch.tours.checks import Verification
+    from seqsearch.tours.tour_files import check_csv
+
+    beside = file.with_suffix(".csv")
+    if beside.is_file():
+        verification = Verification((*verification.checks, check_csv(tour, beside)))
+    say(tour.summary())
+    say(verification.table())
+    return verification.passed
+
+
+def _problem_of(file: Path, tour: "Tour", problem: str | None) -> "tuple[Config | None, str]":
+    """Return the problem whose rules hold and where it is from; None where nothing says."""
+    from seqsearch.problems.problem_file import read_config
+    from seqsearch.problems.registry import builtin_problems
+    from seqsearch.runs.run_folder import CONFIG
+
+    if problem is not None:
+        return read_config(problem), problem
+    beside = file.parent / CONFIG
+    if beside.is_file():
+        return read_config(str(beside)), str(beside)
+    if tour.rules.name in builtin_problems():
+        return read_config(tour.rules.name), f"the built-in problem {tour.rules.name}"
+    return None, ""

@@ -1,4 +1,4 @@
-"""`MarginCurves`: how the margin of a way from a node to a target grows with the flight time."""
+"""`MarginCurves`: how the margin from a node to a target grows with the flight time."""
 
 from dataclasses import dataclass, replace
 from typing import Final, Self, final

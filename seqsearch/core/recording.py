@@ -21,14 +21,17 @@ def record_tour(
 ) -> Tour:
     """Return the tour that leads to a node of the search tree, and on along closing legs.
 
-    Nothing is solved here.
+    Nothing is solved here. Before the first node, -1, there is a tour without bodies.
     """
+    rules = problem.tour_rules()
+    if node < 0:
+        start = problem.first_departure_mjd2000[0]
+        return Tour(rules=rules, t_start_mjd2000=start, bodies=(), legs=(), score=0.0)
     flown = tree.legs_to(node)
     last = tree.node(node)
     rows = [flown[0].dep_row if flown else int(last["row"])]
     rows += [leg.arr_row for leg in flown if leg.arr_row != leg.dep_row]
     flown += closing
-    rules = problem.tour_rules()
     bodies = tuple(tour_body(problem.catalogue, row) for row in rows)
     legs = tuple(_leg(problem, leg) for leg in flown)
     return Tour(

@@ -22,7 +22,7 @@ from feasibility import Legs
 from feasibility.classifier.predictor import LegPredictor
 from feasibility.constants import DAY_S
 from feasibility.orbits import OrbitalNeighbours
-from feasibility.orbits.lambert import lambert
+from feasibility.orbits.lambert import lambert_delta_v
 from seqsearch.core.problem import Problem
 from seqsearch.polish.flight import Flight
 from seqsearch.polish.itinerary import Itinerary
@@ -275,7 +275,7 @@ class Extender:
         legs = self._legs(
             nodes, np.repeat(parent, k), np.repeat(target, k), np.tile(tofs, n), backward
         )
-        delta_v = _lambert_delta_v(legs)
+        delta_v = lambert_delta_v(legs.rv_dep, legs.rv_arr, legs.tof_s, max_revs=0)
         available = legs.thrust / legs.m0 * legs.tof_s
         overload = np.maximum(np.log(delta_v / available), 0.0)
         burnt = legs.m0 * -np.expm1(-np.minimum(delta_v, available) / legs.exhaust_velocity)
@@ -349,12 +349,3 @@ def _diverse(cost: _Array, body: _Index, width: int) -> _Index:
         if len(taken) == width:
             break
     return np.asarray(taken, dtype=np.intp)
-
-
-def _lambert_delta_v(legs: Legs) -> _Array:
-    """Return (n,) the sum of both impulses of the direct transfer in m/s; inf where undefined."""
-    v_dep, v_arr = lambert(legs.rv_dep[:, :3], legs.rv_arr[:, :3], legs.tof_s, max_revs=0)
-    delta_v: _Array = np.linalg.norm(v_dep[:, 0] - legs.rv_dep[:, 3:], axis=1)
-    delta_v += np.linalg.norm(v_arr[:, 0] - legs.rv_arr[:, 3:], axis=1)
-    delta_v[np.isnan(delta_v)] = np.inf
-    return delta_v

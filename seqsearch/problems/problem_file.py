@@ -1,5 +1,6 @@
 """What a problem's TOML file may say, and how it becomes a `Problem` and `SearchSettings`."""
 
+import re
 from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, Final, final
@@ -44,6 +45,13 @@ class ProblemTable(_Table, frozen=True, kw_only=True):
 
     name: str
     description: str = ""
+
+    def __post_init__(self) -> None:
+        # Run folders are named after problems.
+        if re.fullmatch(r"[^\W_][^/\\\x00-\x1f]{0,99}", self.name) is None:
+            raise ValueError(
+                f"name {self.name!r}, expected a plain name that begins with a letter or digit"
+            )
 
 
 @final
@@ -153,15 +161,26 @@ def read_config(problem: str) -> Config:
 
 def _decode(text: str, label: str) -> Config:
     plain = parse_toml(text, label)
-    search = plain.get("search")
-    for key, value in search.items() if isinstance(search, dict) else ():
-        if key in _MOVED and not isinstance(value, dict):
-            table, name = _MOVED[key]
-            raise InputError(
-                f"{label}: key {key!r} of [search] is {name!r} in [search.{table}] "
-                "since version 0.2"
-            )
+    if isinstance(plain.get("search"), dict):
+        plain["search"] = _upgraded(plain["search"], label)
     return convert_table(plain, _whole(), label)
+
+
+def _upgraded(search: dict[str, Any], label: str) -> dict[str, Any]:
+    """Return a table ``[search]`` with the keys of version 0.1 where they are now."""
+    upgraded = {
+        key: value for key, value in search.items() if key not in _MOVED or isinstance(value, dict)
+    }
+    for key in search.keys() - upgraded.keys():
+        table, name = _MOVED[key]
+        inner = dict(upgraded.get(table, {}))
+        if name in inner:
+            raise InputError(
+                f"{label}: [search] has {key!r} of version 0.1 and [search.{table}] {name!r}, "
+                "expected the second alone"
+            )
+        upgraded[table] = inner | {name: search[key]}
+    return upgraded
 
 
 def override(config: Config, **changes: Any) -> Config:
@@ -184,10 +203,17 @@ def with_catalogue(config: Config, file: str) -> Config:
     return msgspec.structs.replace(config, catalogue=table)
 
 
-def build_problem(config: Config) -> Problem:
+def build_problem(config: Config, catalogue: Catalogue | None = None) -> Problem:
     """Load the catalogue and build the validated problem.
 
     A tour of rendezvous; with the table of a plug-in, a tour by its rules.
+
+    Parameters
+    ----------
+    config : Config
+        The problem file.
+    catalogue : Catalogue, optional
+        Stands in for the one that the file names; the same bodies are left out.
 
     Raises
     ------
@@ -200,7 +226,7 @@ def build_problem(config: Config) -> Problem:
     earliest, latest = mission.first_departure_mjd
     base = RendezvousProblem(
         name=config.problem.name,
-        catalogue=_load_catalogue(config),
+        catalogue=_without_excluded(catalogue or _whole_catalogue(config), config),
         spacecraft=Spacecraft(craft.dry_mass_kg, craft.thrust_n, craft.isp_s),
         m0=craft.wet_mass_kg,
         first_departure_mjd2000=(mjd_to_mjd2000(earliest), mjd_to_mjd2000(latest)),
@@ -257,8 +283,20 @@ def load_problem(problem: str, catalogue: str | Path | None = None) -> Problem:
     return build_problem(config if catalogue is None else with_catalogue(config, str(catalogue)))
 
 
-def _load_catalogue(config: Config) -> Catalogue:
-    catalogue = _whole_catalogue(config)
+def table_at_hand(config: Config) -> Catalogue | None:
+    """Return the catalogue that a configuration names, or None where it cannot be found.
+
+    Raises
+    ------
+    InputError
+        It is there, but cannot be read.
+    """
+    file = config.catalogue.file
+    there = config.catalogue.synthetic_bodies if file is None else Path(file).is_file()
+    return _whole_catalogue(config) if there else None
+
+
+def _without_excluded(catalogue: Catalogue, config: Config) -> Catalogue:
     excluded = catalogue.rows_of(np.asarray(config.catalogue.exclude_ids, dtype=np.int64))
     kept = np.setdiff1d(np.arange(len(catalogue)), excluded)
     return catalogue.select(kept) if len(excluded) else catalogue

@@ -1,6 +1,7 @@
 """`RendezvousProblem`: everything that defines a tour of rendezvous, not how to find one."""
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import final
 
 import numpy as np
@@ -183,7 +184,7 @@ class RendezvousProblem:
         craft = self.spacecraft
         return TourRules(
             name=self.name,
-            catalogue=self.catalogue.source,
+            catalogue=Path(self.catalogue.source).name,
             m0_kg=self.m0,
             m_dry_kg=craft.m_dry,
             thrust_n=craft.thrust,

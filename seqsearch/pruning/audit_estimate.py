@@ -20,7 +20,7 @@ A far stratum, of candidates that are hopeless unless the predictor is wrong by
 more than a tenth, holds so many that its weight alone would set the upper limit,
 whatever is found near the boundary. It is a tripwire: sampled as the others,
 and as soon as one flyable candidate is found there, it counts in full. Until then it is left out
-of `interval`, which thus trusts the predictor that far; `interval_no_trust` never
+of `interval`, which thus trusts the predictor that far; `interval_unconditional` never
 leaves it out.
 """
 
@@ -102,7 +102,7 @@ class AuditEstimate:
     interval : tuple of float
         Its confidence interval, if nothing is flyable in far strata where nothing
         was found.
-    interval_no_trust : tuple of float
+    interval_unconditional : tuple of float
         Its confidence interval without that condition.
     far_solved, far_found : int
         Candidates of far strata that were optimised, and flyable ones among them.
@@ -119,7 +119,7 @@ class AuditEstimate:
     flyable_kept: float
     false_prune_rate: float
     interval: tuple[float, float]
-    interval_no_trust: tuple[float, float]
+    interval_unconditional: tuple[float, float]
     far_solved: int
     far_found: int
     contenders: float
@@ -133,17 +133,18 @@ class AuditEstimate:
         kept = [stratum for audit in audits for stratum in audit.kept]
         far = [stratum for stratum in pruned if stratum.far]
         far_found = sum(stratum.flyable for stratum in far)
-        lost, held = _WeightedSum.of(pruned), _WeightedSum.of(kept)
-        total = lost.sum + held.sum
+        flyable_pruned = _WeightedSum.of(pruned).sum
+        flyable_kept = _WeightedSum.of(kept).sum
+        total = flyable_pruned + flyable_kept
         return cls(
             solved_pruned=sum(stratum.solved for stratum in pruned),
             solved_kept=sum(stratum.solved for stratum in kept),
             found=sum(stratum.flyable for stratum in pruned),
-            flyable_pruned=lost.sum,
-            flyable_kept=held.sum,
-            false_prune_rate=lost.sum / total if total else float("nan"),
+            flyable_pruned=flyable_pruned,
+            flyable_kept=flyable_kept,
+            false_prune_rate=flyable_pruned / total if total else float("nan"),
             interval=share_interval([s for s in pruned if not s.far or far_found], kept),
-            interval_no_trust=share_interval(pruned, kept),
+            interval_unconditional=share_interval(pruned, kept),
             far_solved=sum(stratum.solved for stratum in far),
             far_found=far_found,
             contenders=sum(stratum.weight * stratum.contenders for stratum in pruned),

@@ -4,8 +4,11 @@ from pathlib import Path
 
 import numpy as np
 
+from feasibility.runtime.interrupts import say
+from feasibility.runtime.locks import folder_lock
 from seqsearch.beam.state import SearchState
 from seqsearch.budget import Limits
+from seqsearch.core.recording import record_tour
 from seqsearch.problems.problem_file import Config, build_problem
 from seqsearch.pruning.pruner_spec import parse_pruner
 from seqsearch.runs.checkpoint import Checkpoints, Origin, catalogue_digest
@@ -33,11 +36,20 @@ def begin_search(config: Config, path: Path, seed: int, limits: Limits) -> int:
         config_sha256=folder.config_digest(),
         catalogue_sha256=catalogue_digest(problem.catalogue),
     )
-    checkpoints = Checkpoints.begin(folder.path, origin, state)
-    print(
-        f"{problem.name}: {len(problem.catalogue)} bodies from {problem.catalogue.source}, "
-        f"seed {seed}, writing to {folder.path}"
-    )
-    return run_session(
-        folder, checkpoints, state, config=config, problem=problem, pruner=pruner, limits=limits
-    )
+    with folder_lock(folder.path):
+        checkpoints = Checkpoints.begin(folder.path, origin, state)
+        # Whenever the run ends, even before its first node, there is a result to read.
+        folder.write(record_tour(problem, state.tree, state.best_node), state.counters)
+        say(
+            f"{problem.name}: {len(problem.catalogue)} bodies from {problem.catalogue.source}, "
+            f"seed {seed}, writing to {folder.path}"
+        )
+        return run_session(
+            folder,
+            checkpoints,
+            state,
+            config=config,
+            problem=problem,
+            pruner=pruner,
+            limits=limits,
+        )

@@ -11,7 +11,6 @@ from feasibility.runtime.provenance import provenance
 from seqsearch.runs.run_folder import SEQUENCE
 from seqsearch.tours.checks import Check
 from seqsearch.tours.tour import Tour
-from seqsearch.tours.tour_files import read_tour
 
 FLEET: Final = "fleet.json"
 """Name of the file that makes a folder a fleet's."""
@@ -54,13 +53,13 @@ def write_fleet(folder: Path, tours: list[Tour], probes: int, seed: int) -> None
     write_json(folder / FLEET, record)
 
 
-def read_fleet(folder: Path) -> list[Tour]:
-    """Return the tours of the probes that are done, as their own folders have them.
+def probe_paths(folder: Path) -> list[Path]:
+    """Return the tour files of the probes that are done, in their own folders.
 
     Raises
     ------
     InputError
-        ``fleet.json`` or a tour is missing or damaged.
+        ``fleet.json`` is missing or damaged.
     """
     file = folder / FLEET
     try:
@@ -68,7 +67,7 @@ def read_fleet(folder: Path) -> list[Tour]:
         names = [str(probe["folder"]) for probe in record["done"]]
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise InputError(f"{file}: cannot be read as a fleet ({error})") from None
-    return [read_tour(folder / Path(name).name / SEQUENCE) for name in names]
+    return [folder / Path(name).name / SEQUENCE for name in names]
 
 
 def check_disjoint(tours: list[Tour]) -> Check:

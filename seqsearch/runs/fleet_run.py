@@ -7,6 +7,7 @@ from pathlib import Path
 import msgspec
 
 from feasibility.runtime.folders import new_folder
+from feasibility.runtime.interrupts import say
 from seqsearch.budget import Limits
 from seqsearch.problems.problem_file import Config
 from seqsearch.runs.fleet import probe_folder, write_fleet
@@ -64,7 +65,7 @@ def run_fleet(
             left_s = max(1.0, limits.time_limit_s - (time.monotonic() - begin))
             share_s = left_s / (probes - number + 1)
         probe_seed = seed + number - 1
-        print(f"probe {number} of {probes}", flush=True)
+        say(f"probe {number} of {probes}")
         polish_share = config.fleet.polish_share
         code = search_probe(
             single,
@@ -79,19 +80,21 @@ def run_fleet(
         if code != 0:
             return code
         if polish_share > 0 and read_tour(sub / SEQUENCE).legs:
-            polish_run(
+            code = polish_run(
                 sub,
                 time_limit_s=None if share_s is None else polish_share * share_s,
                 seed=probe_seed,
                 workers=limits.workers,
             )
+            if code != 0:
+                return code
         tours.append(read_tour(sub / SEQUENCE))
         write_fleet(folder, tours, probes, seed)
-    print()
+    say()
     for number, tour in enumerate(tours, 1):
-        print(f"probe {number}: {tour.summary()}")
+        say(f"probe {number}: {tour.summary()}")
     total = sum(tour.n_asteroids for tour in tours)
-    print(f"{total} asteroids; check them with: seqsearch verify {folder}")
+    say(f"{total} asteroids; check them with: seqsearch verify {folder}")
     return 0
 
 

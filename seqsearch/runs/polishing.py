@@ -7,21 +7,20 @@ from typing import Final
 import numpy as np
 
 from feasibility import InputError
-from feasibility.runtime.atomic import write_json, write_text
+from feasibility.runtime.atomic import write_json
+from feasibility.runtime.interrupts import interrupt_code, say
+from feasibility.runtime.locks import folder_lock
 from feasibility.runtime.provenance import provenance
 from feasibility.runtime.workers import default_workers, worker_pool
 from seqsearch.core.problem import Problem
 from seqsearch.polish import PolishResult, PolishStep, distinct_tours, polish
-from seqsearch.problems.problem_file import build_problem, read_config
+from seqsearch.problems.problem_file import build_problem, read_config, with_catalogue
 from seqsearch.pruning.pruner_spec import parse_pruner, predictor_of
 from seqsearch.runs.checkpoint import FOLDER, Checkpoints, catalogue_digest
-from seqsearch.runs.run_folder import CONFIG, SEQUENCE
+from seqsearch.runs.run_folder import CONFIG, SEQUENCE, RunFolder, worth
 from seqsearch.tours.plots import plot_tour
 from seqsearch.tours.tour import Tour
-from seqsearch.tours.tour_files import read_tour, to_csv, to_json
-
-SEARCHED: Final = "sequence.search.json"
-"""Name of the file that keeps the tour as the search found it."""
+from seqsearch.tours.tour_files import read_tour
 
 REPORT: Final = "polish.json"
 """Name of the file that says what polishing gained."""
@@ -36,6 +35,7 @@ def polish_run(
     time_limit_s: float | None,
     seed: int = 0,
     workers: int | None = None,
+    catalogue: str | None = None,
 ) -> int:
     """Polish the tours of a run folder and return the exit code.
 
@@ -52,6 +52,8 @@ def polish_run(
         Seed of the moves.
     workers : int, optional
         Processes; default: one a core.
+    catalogue : str, optional
+        Where the asteroid table is now; it has to be the same one.
 
     Raises
     ------
@@ -63,8 +65,20 @@ def polish_run(
         raise InputError(f"--seed {seed}: expected zero or more")
     if workers is not None and workers < 1:
         raise InputError(f"--workers {workers}: expected one or more")
+    if not run.is_dir():
+        raise InputError(f"{run}: no such run folder")
+    with folder_lock(run):
+        return _polished(run, time_limit_s, seed, workers or default_workers(), catalogue)
+
+
+def _polished(
+    run: Path, time_limit_s: float | None, seed: int, workers: int, catalogue: str | None
+) -> int:
     before = read_tour(run / SEQUENCE)
+    folder = RunFolder.open(run)
     config = read_config(str(run / CONFIG))
+    if catalogue is not None:
+        config = with_catalogue(config, catalogue)
     problem = build_problem(config)
     if problem.custom_moves is not None or problem.tour_rules().events:
         raise InputError(
@@ -79,14 +93,14 @@ def polish_run(
         from feasibility.classifier.classifier import FeasibilityClassifier
 
         predictor = FeasibilityClassifier.load()
-    print(f"{run}: polishing {len(tours)} tours, the best: {before.summary()}", flush=True)
+    say(f"{run}: polishing {len(tours)} tours, the best: {before.summary()}")
 
     def on_step(step: PolishStep, tour: Tour) -> None:
-        print(_step_line(step), flush=True)
-        if _better(tour, before):
-            _replace(run, tour)
+        say(_step_line(step))
+        if worth(tour) > worth(before):
+            folder.write_polished(tour)
 
-    with worker_pool(workers or default_workers()) as executor:
+    with worker_pool(workers) as executor:
         result = polish(
             problem,
             tours,
@@ -97,13 +111,13 @@ def polish_run(
             on_step=on_step,
         )
     _report(run, before, result, seed, time_limit_s)
-    if _better(result.tour, before):
+    if worth(result.tour) > worth(before):
         plot_tour(result.tour, run / "tour.png")
-    print()
-    print(result.tour.one_line())
-    print(f"{result.tour.summary()}; polish {result.stopped}, {result.moves} moves")
-    print(f"check it with: seqsearch verify {run}")
-    return 0
+    say()
+    say(result.tour.one_line())
+    say(f"{result.tour.summary()}; polish {result.stopped}, {result.moves} moves")
+    say(f"check it with: seqsearch verify {run}")
+    return interrupt_code()
 
 
 def _searched(run: Path, problem: Problem) -> list[Tour]:
@@ -116,19 +130,6 @@ def _searched(run: Path, problem: Problem) -> list[Tour]:
             f"{problem.catalogue.source}: not the asteroid table that {run} was begun with"
         )
     return distinct_tours(problem, state.tree, _TOURS)
-
-
-def _better(tour: Tour, before: Tour) -> bool:
-    key, old = ((t.n_asteroids, -t.duration_days) for t in (tour, before))
-    return key > old
-
-
-def _replace(run: Path, tour: Tour) -> None:
-    """Write the tour; the first time, keep the search's."""
-    if not (run / SEARCHED).exists():
-        write_text(run / SEARCHED, (run / SEQUENCE).read_text(encoding="utf-8"))
-    write_text(run / SEQUENCE, to_json(tour))
-    write_text(run / "sequence.csv", to_csv(tour))
 
 
 def _step_line(step: PolishStep) -> str:
@@ -146,7 +147,7 @@ def _report(
         "time_limit_s": time_limit_s,
         "moves": result.moves,
         "stopped": result.stopped,
-        "replaced": _better(result.tour, before),
+        "replaced": worth(result.tour) > worth(before),
         "steps": [asdict(step) for step in result.steps],
         "provenance": provenance(),
     }

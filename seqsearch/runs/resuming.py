@@ -3,8 +3,10 @@
 from pathlib import Path
 
 from feasibility import InputError
+from feasibility.runtime.interrupts import say
+from feasibility.runtime.locks import folder_lock
 from seqsearch.budget import Limits
-from seqsearch.problems.problem_file import build_problem, read_config
+from seqsearch.problems.problem_file import build_problem, read_config, with_catalogue
 from seqsearch.pruning.pruner_spec import parse_pruner
 from seqsearch.runs.checkpoint import Checkpoints, catalogue_digest
 from seqsearch.runs.run_folder import CONFIG, RunFolder
@@ -18,6 +20,7 @@ def resume_search(
     time_limit_s: float | None,
     max_solves: int | None,
     workers: int | None,
+    catalogue: str | None = None,
 ) -> int:
     """Go on with a run where it stopped, or after a rank of it, and return the exit code.
 
@@ -33,6 +36,8 @@ def resume_search(
         New budgets for the whole run; default: those that it was begun with.
     workers : int, optional
         Processes.
+    catalogue : str, optional
+        Where the asteroid table is now; it has to be the same one.
 
     Raises
     ------
@@ -40,6 +45,20 @@ def resume_search(
         No run folder, or one that is damaged, changed or of another version;
         an asteroid table that is not the same any more; a budget that is used up.
     """
+    if not run.is_dir():
+        raise InputError(f"{run}: no such run folder")
+    with folder_lock(run):
+        return _resumed(run, after, time_limit_s, max_solves, workers, catalogue)
+
+
+def _resumed(
+    run: Path,
+    after: tuple[int, int] | None,
+    time_limit_s: float | None,
+    max_solves: int | None,
+    workers: int | None,
+    catalogue: str | None,
+) -> int:
     checkpoints, state = Checkpoints.load(run, after)
     origin = checkpoints.origin
     limits = Limits(
@@ -63,6 +82,8 @@ def resume_search(
             f"{run / CONFIG}: changed since the run was begun; begin another run with it"
         )
     config = read_config(str(run / CONFIG))
+    if catalogue is not None:
+        config = with_catalogue(config, catalogue)
     pruner = parse_pruner(config.search.pruner)
     problem = build_problem(config)
     if catalogue_digest(problem.catalogue) != origin.catalogue_sha256:
@@ -71,7 +92,7 @@ def resume_search(
         )
     folder.note_session(limits.time_limit_s, limits.max_solves)
     checkpoints.discard_later()
-    print(
+    say(
         f"{problem.name}: {len(problem.catalogue)} bodies from {problem.catalogue.source}, "
         f"seed {origin.seed}, going on in {run} after pass {state.pass_number}, "
         f"{len(state.counters)} ranks and {state.spent_s:.0f} s"

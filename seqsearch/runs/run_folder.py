@@ -4,6 +4,7 @@ import csv
 import hashlib
 import io
 import json
+import os
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -14,7 +15,7 @@ from feasibility.runtime.atomic import write_json, write_text
 from feasibility.runtime.folders import new_folder
 from feasibility.runtime.provenance import provenance
 from seqsearch.beam.counters import RankCounters
-from seqsearch.problems.problem_file import Config, to_toml
+from seqsearch.problems.problem_file import Config, to_toml, with_catalogue
 from seqsearch.pruning.audit_estimate import AuditEstimate
 from seqsearch.tours.tour import Tour
 from seqsearch.tours.tour_files import read_tour, to_csv, to_json
@@ -25,6 +26,15 @@ CONFIG: Final = "config.toml"
 SEQUENCE: Final = "sequence.json"
 """Name of the file with the best tour."""
 
+
+CSV: Final = "sequence.csv"
+"""Name of the file with its legs."""
+
+SEARCHED: Final = "sequence.search.json"
+"""Name of the file that keeps the best tour as the search found it."""
+
+POLISHED: Final = "sequence.polished.json"
+"""Name of the file that keeps the best tour that polishing found."""
 
 PROVENANCE: Final = "provenance.json"
 """Name of the file that says where the run came from."""
@@ -37,12 +47,16 @@ class RunFolder:
     Use `create` or `open`. The files are ``config.toml`` (resolved),
     ``provenance.json`` (seed, versions, git commit, command), ``counters.csv``,
     ``audit.json``, ``sequence.json`` and ``sequence.csv``; the last four are
-    rewritten after each rank, so an interrupted run leaves its best tour.
+    rewritten after each rank, so an interrupted run leaves its best tour. The stages of
+    a tour are kept beside it, as ``sequence.search.json`` and ``sequence.polished.json``.
     """
 
-    def __init__(self, path: Path, legs: int = 0) -> None:
+    def __init__(
+        self, path: Path, found: Tour | None = None, polished: Tour | None = None
+    ) -> None:
         self.path = path
-        self._legs = legs
+        self._found = found
+        self._polished = polished
 
     @classmethod
     def create(cls, path: Path, config: Config, seed: int) -> Self:
@@ -55,7 +69,7 @@ class RunFolder:
         """
         new_folder(path)
         folder = cls(path)
-        write_text(path / CONFIG, to_toml(config))
+        write_text(path / CONFIG, to_toml(_portable(config, path)))
         write_json(path / PROVENANCE, provenance() | {"seed": seed})
         return folder
 
@@ -66,10 +80,13 @@ class RunFolder:
         Raises
         ------
         InputError
-            Its best tour cannot be read.
+            A tour in it cannot be read.
         """
-        sequence = path / SEQUENCE
-        return cls(path, len(read_tour(sequence).legs) if sequence.exists() else 0)
+        found, polished, best = (
+            read_tour(path / name) if (path / name).exists() else None
+            for name in (SEARCHED, POLISHED, SEQUENCE)
+        )
+        return cls(path, found or best, polished)
 
     def config_digest(self) -> str:
         """Return the SHA-256 of the configuration file.
@@ -103,22 +120,55 @@ class RunFolder:
         write_json(file, record)
 
     def write(self, tour: Tour, counters: Sequence[RankCounters]) -> None:
-        """Write the best tour, the counters and the audit.
+        """Write the best tour that the search has found, the counters and the audit.
 
-        A tour with fewer legs than the one that is there does not replace
-        it: a resumed run repeats the rank that was cut short.
+        A tour with a lower score than the one that was found before does not replace it:
+        a resumed run repeats the rank that was cut short. Neither does it replace a polished
+        one that is as good.
 
         Raises
         ------
         InputError
             A file cannot be written; the files written before are intact.
         """
-        if len(tour.legs) >= self._legs:
-            write_text(self.path / SEQUENCE, to_json(tour))
-            write_text(self.path / "sequence.csv", to_csv(tour))
-            self._legs = len(tour.legs)
+        if self._found is None or _reached(tour) >= _reached(self._found):
+            self._found = tour
+            write_text(self.path / SEARCHED, to_json(tour))
+            if self._polished is None or worth(tour) > worth(self._polished):
+                self._write_best(tour)
         write_text(self.path / "audit.json", audit_json(counters))
         write_text(self.path / "counters.csv", counters_csv(counters))
+
+    def write_polished(self, tour: Tour) -> None:
+        """Write a tour that polishing made better than all before.
+
+        Raises
+        ------
+        InputError
+            As `write`.
+        """
+        self._polished = tour
+        write_text(self.path / POLISHED, to_json(tour))
+        self._write_best(tour)
+
+    def _write_best(self, tour: Tour) -> None:
+        write_text(self.path / SEQUENCE, to_json(tour))
+        write_text(self.path / CSV, to_csv(tour))
+
+
+def _portable(config: Config, folder: Path) -> Config:
+    """Return the configuration with the table's path as seen from the run folder."""
+    file = config.catalogue.file
+    return config if file is None else with_catalogue(config, os.path.relpath(file, folder))
+
+
+def worth(tour: Tour) -> tuple[float, int, float, float]:
+    """Return what tells the better of two tours: score, visits, less time, more mass."""
+    return (*_reached(tour), -tour.duration_days, tour.m_final_kg)
+
+
+def _reached(tour: Tour) -> tuple[float, int]:
+    return tour.score, tour.n_asteroids
 
 
 def counters_csv(counters: Sequence[RankCounters]) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 from feasibility import AllOf, Pruner
 from feasibility.classifier.predictor import LegPredictor
 from feasibility.pruners import PrunerContractError
+from feasibility.runtime.interrupts import interrupt_code, say
 from feasibility.runtime.workers import default_workers, worker_pool
 from feasibility.sims_flanagan.fast.compilation import compile_kernels, sample_leg
 from seqsearch.beam.beam_search import search
@@ -43,7 +44,8 @@ def run_session(
     -------
     int
         0; 1 where the worker processes died again and again; 2 where the pruner
-        broke its contract. What was found until then is in the run folder.
+        broke its contract; 130 or 143 after Ctrl-C or SIGTERM. What was found until then is
+        in the run folder.
     """
 
     def on_rank(state: SearchState) -> None:
@@ -52,7 +54,7 @@ def run_session(
             checkpoints.save(state)
         tour = record_tour(problem, state.tree, state.best_node, state.closing)
         folder.write(tour, state.counters)
-        print(_rank_line(state.counters[-1], tour), flush=True)
+        say(_rank_line(state.counters[-1], tour))
 
     workers = limits.workers or default_workers()
     try:
@@ -73,6 +75,8 @@ def run_session(
                 on_rank=on_rank,
             )
             mended = 0 if executor is None else executor.mended
+            if executor is not None and result.stopped == "interrupted":
+                executor.abandon()
     except (PrunerContractError, BrokenExecutor) as error:
         print(f"seqsearch: {error}", file=sys.stderr)
         print(f"all ranks before are saved: {_go_on(folder.path)}", file=sys.stderr)
@@ -80,7 +84,7 @@ def run_session(
     folder.write(result.tour, result.counters)
     plot_tour(result.tour, folder.path / "tour.png")
     _report(folder.path, result, mended)
-    return 0
+    return interrupt_code()
 
 
 def _audit_predictor(config: Config, pruner: AllOf) -> LegPredictor | None:
@@ -95,25 +99,30 @@ def _audit_predictor(config: Config, pruner: AllOf) -> LegPredictor | None:
 
 def _report(path: Path, result: SearchResult, mended: int) -> None:
     counters = result.counters
-    print()
-    print(result.tour.table())
-    print()
+    say()
+    if result.tour.legs:
+        say(result.tour.table())
+        say()
     if counters and (barren := counters[-1].barren_pruner()):
-        print(f"no leg survived pruner {barren} at rank {counters[-1].rank}")
+        say(f"no leg survived pruner {barren} at rank {counters[-1].rank}")
     if mended:
-        print(f"worker processes were lost and replaced {mended} times")
+        say(f"worker processes were lost and replaced {mended} times")
     audits = [record.audit for record in counters if record.audit is not None]
     if audits:
-        print(AuditEstimate.of(audits).one_line())
+        say(AuditEstimate.of(audits).one_line())
     optimised = sum(record.optimised for record in counters)
     if optimised:
         failed = 1.0 - sum(record.feasible for record in counters) / optimised
-        print(f"{optimised} legs optimised, {100 * failed:.1f} % of them could not be flown")
-    print(result.tour.one_line())
-    print(f"{result.tour.summary()}; search {result.stopped}")
+        say(f"{optimised} legs optimised, {100 * failed:.1f} % of them could not be flown")
+    if not result.tour.bodies:
+        say(f"nothing found yet (search {result.stopped}); give more time")
+        say(_go_on(path))
+        return
+    say(result.tour.one_line())
+    say(f"{result.tour.summary()}; search {result.stopped}")
     if result.stopped != "complete":
-        print(_go_on(path))
-    print(f"check it with: seqsearch verify {path}")
+        say(_go_on(path))
+    say(f"check it with: seqsearch verify {path}")
 
 
 def _go_on(path: Path) -> str:

@@ -1,5 +1,6 @@
 """What a verification consists of: checks, and the flown tour that they look at."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final, final
 
@@ -12,6 +13,16 @@ SPEED_TOLERANCE_M_S: Final = 1e-6
 MASS_TOLERANCE_KG: Final = 0.01
 TIME_TOLERANCE_DAYS: Final = 1e-6
 """By how much numbers of a tour file may differ that should be equal."""
+
+
+def largest(values: Iterable[float], default: float = 0.0) -> float:
+    """Return the largest value, NaN if one is, so that a comparison with a limit fails."""
+    return float(np.max([*values] or [default]))
+
+
+def smallest(values: Iterable[float], default: float = np.inf) -> float:
+    """Return the smallest value, NaN if one is, so that a comparison with a limit fails."""
+    return float(np.min([*values] or [default]))
 
 
 @final

@@ -1,5 +1,8 @@
 """Two-body motion as the verification computes it: Kepler's equation by scipy, legs by DOP853."""
 
+import itertools
+from typing import Final
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
@@ -8,6 +11,13 @@ from scipy.spatial.transform import Rotation
 
 from feasibility.constants import AU, DAY_S
 from seqsearch.tours.records import TourBody, TourLeg
+
+_MOST_CALLS: Final = 200_000
+"""Evaluations of the motion for one coast; decades in the main belt take some thousands."""
+
+
+class _TooLongError(Exception):
+    """The motion was evaluated too often."""
 
 
 def body_state(body: TourBody, t_mjd2000: float, mu: float) -> NDArray[np.float64]:
@@ -61,16 +71,32 @@ def fly(leg: TourLeg, departure: TourBody, mu: float) -> NDArray[np.float64]:
 
 
 def _coast(state: NDArray[np.float64], dt_s: float, mu: float) -> NDArray[np.float64]:
-    """Integrate two-body motion with DOP853, in units of AU and the matching velocity."""
+    """Integrate two-body motion with DOP853, in units of AU and the matching velocity.
+
+    NaN where that takes too many steps.
+    """
     speed = np.sqrt(mu / AU)
     scale = np.array([AU, AU, AU, speed, speed, speed])
 
+    calls = itertools.count()
+
     def motion(_t: float, y: NDArray[np.float64]) -> NDArray[np.float64]:
+        # Orbits through the Sun need steps without end, which no tour does.
+        if next(calls) > _MOST_CALLS:
+            raise _TooLongError
         r = y[:3]
         return np.concatenate([y[3:], -r / np.linalg.norm(r) ** 3])
 
-    solution = solve_ivp(
-        motion, (0.0, dt_s * speed / AU), state / scale, method="DOP853", rtol=1e-12, atol=1e-13
-    )
+    try:
+        solution = solve_ivp(
+            motion,
+            (0.0, dt_s * speed / AU),
+            state / scale,
+            method="DOP853",
+            rtol=1e-12,
+            atol=1e-13,
+        )
+    except _TooLongError:
+        return np.full(6, np.nan)
     end: NDArray[np.float64] = solution.y[:, -1] * scale
-    return end
+    return end if solution.success else np.full(6, np.nan)

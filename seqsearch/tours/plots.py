@@ -52,7 +52,7 @@ def _draw_path(axes: "Axes", tour: Tour) -> None:
         axes.plot(track[:, 0], track[:, 1], linewidth=1.2)
     stops = [tour.legs[0].t_dep_mjd2000] if tour.legs else [tour.t_start_mjd2000]
     stops += [leg.t_arr_mjd2000 for leg in tour.legs if not leg.is_fly_by]
-    for k, (body, epoch) in enumerate(zip(tour.bodies, stops, strict=True)):
+    for k, (body, epoch) in enumerate(zip(tour.bodies, stops, strict=False)):
         x, y = body_state(body, epoch, tour.rules.mu_m3_s2)[:2] / AU
         axes.plot(x, y, "ko", markersize=3)
         axes.annotate(str(k), (x, y), xytext=(4, 4), textcoords="offset points", fontsize=7)

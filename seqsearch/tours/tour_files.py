@@ -11,11 +11,13 @@ import numpy as np
 
 from feasibility.constants import MJD2000_MJD
 from feasibility.errors import InputError
+from seqsearch.tours.checks import Check
 from seqsearch.tours.events.make import make_event
 from seqsearch.tours.events.protocol import TourEvent
 from seqsearch.tours.scores.make import make_score
 from seqsearch.tours.scores.protocol import ScoreRule
 from seqsearch.tours.tour import FORMAT, Tour, TourRules
+from seqsearch.tours.validation import check_numbers
 
 FORMAT_1: Final = "seqsearch-tour-1"
 """The layout of version 0.1, in which a problem's own rules stood in a table of its name."""
@@ -55,24 +57,32 @@ def read_tour(path: Path) -> Tour:
     Raises
     ------
     InputError
-        The file is missing, truncated, not such a file, or of another version.
+        The file is missing, truncated, not such a file, of another version, or has numbers
+        that no tour has.
     """
     try:
         data = path.read_bytes()
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror})") from None
     try:
-        found = msgspec.json.decode(data, type=_Head).format
-        if found == FORMAT_1:
-            record = _upgraded(msgspec.json.decode(data))
-            return msgspec.convert(record, type=Tour, dec_hook=_record)
-        if found == FORMAT:
-            return msgspec.json.decode(data, type=Tour, dec_hook=_record)
-    except (msgspec.DecodeError, KeyError, TypeError, AttributeError) as error:
+        tour = _decoded(data)
+    except (msgspec.DecodeError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise InputError(f"{path}: not a complete {FORMAT} file ({error})") from None
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
-    raise InputError(f"{path}: format {found!r}, expected {FORMAT!r}")
+    return tour
+
+
+def _decoded(data: bytes) -> Tour:
+    found = msgspec.json.decode(data, type=_Head).format
+    if found not in (FORMAT, FORMAT_1):
+        raise InputError(f"format {found!r}, expected {FORMAT!r}")
+    plain = msgspec.json.decode(data)
+    if found == FORMAT_1:
+        plain = _upgraded(plain)
+    tour = msgspec.convert(plain, type=Tour, dec_hook=_record)
+    check_numbers(tour)
+    return tour
 
 
 def to_json(tour: Tour) -> str:
@@ -113,6 +123,26 @@ def to_csv(tour: Tour) -> str:
         )
         arrived = leg.t_arr_mjd2000
     return text.getvalue()
+
+
+def check_csv(tour: Tour, path: Path) -> Check:
+    """Check that a ``sequence.csv`` has the numbers of a tour; names may be written otherwise."""
+    try:
+        rows = list(csv.reader(path.read_text(encoding="utf-8").splitlines()))
+    except (OSError, UnicodeDecodeError, csv.Error):
+        rows = []
+    expected = list(csv.reader(to_csv(tour).splitlines()))
+    names = {_COLUMNS.index("from_name"), _COLUMNS.index("to_name")}
+    numbers, ours = (
+        [[cell for k, cell in enumerate(row) if k not in names] for row in table]
+        for table in (rows, expected)
+    )
+    return Check(
+        f"{path.name} has the same numbers",
+        numbers == ours,
+        "the same" if numbers == ours else "other numbers",
+        "the same",
+    )
 
 
 def _record(kind: type, record: Any) -> Any:

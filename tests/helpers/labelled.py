@@ -7,9 +7,9 @@ import numpy as np
 
 from feasibility.dataset import Dataset, read_protocol
 from feasibility.dataset.columns import ARRIVAL_STATE, COLUMNS, DEPARTURE_STATE
-from feasibility.dataset.samplers.impulsive import lowest_delta_v
 from feasibility.dataset.storage import shard_path, write_metadata, write_shard
 from feasibility.orbits import synthetic_main_belt
+from feasibility.orbits.lambert import lambert_delta_v
 from feasibility.orbits.mima import mima
 
 
@@ -38,7 +38,7 @@ def labelled_dataset(legs: int = 1500, seed: int = 0, bodies: int = 40) -> Datas
         "isp_s": flown.isp,
         "m_dry_kg": flown.m_dry,
         "dt_imp_days": draw.dt_imp_days,
-        "lambert_dv_m_s": lowest_delta_v(flown.rv_dep, flown.rv_arr, flown.tof_days, 2),
+        "lambert_dv_m_s": lambert_delta_v(flown.rv_dep, flown.rv_arr, flown.tof_s, 2),
         "m_star_kg": m_star,
         "log_margin": log_margin,
         "m_final_kg": np.full(legs, np.nan),

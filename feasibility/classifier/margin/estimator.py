@@ -86,9 +86,9 @@ class MarginEstimator:
 
         def look(rows: NDArray[np.intp]) -> None:
             log_margin, doubt, near = self.estimate(legs.take(rows))
-            found = np.isfinite(log_margin)
+            estimated = np.isfinite(log_margin)
             p = np.full(len(rows), _UNKNOWN)
-            p[found] = self._calibration.probability(log_margin[found], doubt[found])
+            p[estimated] = self._calibration.probability(log_margin[estimated], doubt[estimated])
             probability[rows] = p
             # By the quick features wherever they exist, as the mass must not decide which.
             inside[rows] = np.where(known[rows], inside[rows], near)

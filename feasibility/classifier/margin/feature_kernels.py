@@ -31,11 +31,12 @@ from feasibility.sims_flanagan.fast.element_kernels import to_elements
 
 _Array = NDArray[np.float64]
 LambertWork = tuple[_Array, _Array, _Array, _Array, _Array, _Array]
+HintWork = tuple[_Array, NDArray[np.int64], _Array, _Array, _Array, _Array]
 FeatureWork = tuple[
     PathWork,
     tuple[_Array, _Array, _Array, _Array, _Array],
     LambertWork,
-    tuple[_Array, NDArray[np.int64], _Array, _Array, _Array, _Array],
+    HintWork,
 ]
 
 N_GEOMETRY = 20
@@ -49,6 +50,7 @@ _TWO_PI = 2.0 * math.pi
 _N_COUNTS = 5
 _WORTH_REFINING = 3.0
 _N_ROUNDS = 3
+_N_OTHERS = 2 * _N_ROUNDS + 1 + _N_COUNTS + 3 * (MAX_REVS + 1)
 # int() at the calls: numba would compile a kernel once for each literal number of steps.
 _FIRST_STEPS = 3
 _NEXT_STEPS = 2
@@ -404,6 +406,57 @@ def refine(
 
 
 @inner_kernel
+def other_hints(hint_work: HintWork, tof: float, base: float, out: _Array) -> None:
+    """Write the _N_OTHERS features that compare other estimates with the hint.
+
+    `base` is the logarithm of the hint's impulse of one segment.
+    """
+    lam, _, _, z_first, z, z_lambert = hint_work
+    for j in range(_N_ROUNDS):
+        out[j] = clip(math.log(z[j]) - base, -1.0, 1.0)
+    o = _N_ROUNDS
+    for j in range(_N_ROUNDS + 1):
+        out[o + j] = log_ratio(z[_N_ROUNDS + 1 + j], base)
+    o += _N_ROUNDS + 1
+    for q in range(_N_COUNTS):
+        out[o + q] = log_ratio(z_first[q], base)
+    o += _N_COUNTS
+    for j in range(2 * (MAX_REVS + 1)):
+        unit = tof if j % 2 == 0 else 1.0
+        out[o + j] = log_ratio(lam[j] * unit / N_NODES, base)
+    o += 2 * (MAX_REVS + 1)
+    for revs in range(MAX_REVS + 1):
+        out[o + revs] = log_ratio(z_lambert[revs], base)
+
+
+@inner_kernel
+def thrust_directions(path_work: PathWork, base: float, out: _Array) -> None:
+    """Write the last features, from the dual that the best hint has left in `path_work`.
+
+    Where it nearly vanishes the thrust turns; where it points the thrust points.
+    """
+    _, _, _, weights, g, c, _, _, _ = path_work
+    average = 0.0
+    smallest = np.inf
+    largest_use = 0.0
+    for i in range(N_NODES):
+        average += g[3 * N_NODES + i] / N_NODES
+        smallest = min(smallest, g[3 * N_NODES + i])
+        largest_use = max(largest_use, weights[i] * g[3 * N_NODES + i] / c[i])
+    out[0] = smallest / average
+    out[1] = clip(math.log(largest_use) - base, -1.0, 1.0)
+    o = 2
+    for k in range(5):
+        i = (0, 5, 10, 14, 19)[k]
+        length = max(g[3 * N_NODES + i], 1e-12 * average)
+        out[o] = g[i] / length
+        out[o + 1] = g[N_NODES + i] / length
+        out[o + 2] = g[2 * N_NODES + i] / length
+        out[o + 3] = clip(length / average, 0.0, 4.0)
+        o += 4
+
+
+@inner_kernel
 def leg_features(
     rv_dep: _Array,
     rv_arr: _Array,
@@ -497,43 +550,8 @@ def leg_features(
     out[o] = clip(excess / tof, -2.0, 2.0)
     out[o + 1] = 0.5 * (mean + excess) / math.pi
     out[o + 2] = clip((excess - near) / _TWO_PI, -2.0, 2.0)
-    o += 3
-    # Other estimates, against the hint.
-    for j in range(_N_ROUNDS):
-        out[o + j] = clip(math.log(z[j]) - base, -1.0, 1.0)
-    o += _N_ROUNDS
-    for j in range(_N_ROUNDS + 1):
-        out[o + j] = log_ratio(z[_N_ROUNDS + 1 + j], base)
-    o += _N_ROUNDS + 1
-    for q in range(_N_COUNTS):
-        out[o + q] = log_ratio(z_first[q], base)
-    o += _N_COUNTS
-    for j in range(2 * (MAX_REVS + 1)):
-        unit = tof if j % 2 == 0 else 1.0
-        out[o + j] = log_ratio(lam[j] * unit / N_NODES, base)
-    o += 2 * (MAX_REVS + 1)
-    for revs in range(MAX_REVS + 1):
-        out[o + revs] = log_ratio(z_lambert[revs], base)
-    o += MAX_REVS + 1
-    # The dual: where it nearly vanishes the thrust turns; where it points the thrust points.
-    average = 0.0
-    smallest = np.inf
-    largest_use = 0.0
-    for i in range(N_NODES):
-        average += g[3 * N_NODES + i] / N_NODES
-        smallest = min(smallest, g[3 * N_NODES + i])
-        largest_use = max(largest_use, weights[i] * g[3 * N_NODES + i] / c[i])
-    out[o] = smallest / average
-    out[o + 1] = clip(math.log(largest_use) - base, -1.0, 1.0)
-    o += 2
-    for k in range(5):
-        i = (0, 5, 10, 14, 19)[k]
-        length = max(g[3 * N_NODES + i], 1e-12 * average)
-        out[o] = g[i] / length
-        out[o + 1] = g[N_NODES + i] / length
-        out[o + 2] = g[2 * N_NODES + i] / length
-        out[o + 3] = clip(length / average, 0.0, 4.0)
-        o += 4
+    other_hints(hint_work, tof, base, out[o + 3 : o + 3 + _N_OTHERS])
+    thrust_directions(path_work, base, out[o + 3 + _N_OTHERS :])
     # On short arcs the Lambert path is the better hint.
     share = 1.0 / (1.0 + (out[13] / _SHORT_TURNS) ** 8)
     difference = math.log(z_lambert[0]) - base

@@ -15,7 +15,7 @@ from feasibility.errors import InputError
 from feasibility.legs import Legs
 
 _LEGS_AT_A_TIME: Final = 8192
-"""Bounds the memory: 103 features and the widest layer of so many legs."""
+"""Bounds the memory: 103 features and the widest layer of this many legs."""
 
 _UNKNOWN: Final = 0.5
 """Probability where the features do not exist, so that nothing is known."""

@@ -10,7 +10,7 @@ from feasibility.constants import DAY_S, MU_SUN
 from feasibility.errors import InputError
 from feasibility.legs import Legs
 from feasibility.orbits import cartesian_to_classical, cartesian_to_equinoctial
-from feasibility.orbits.mima import lambert_delta_v
+from feasibility.orbits.lambert import lambert_delta_v
 
 FEATURE_SET: Final = "paper-103"
 """Name of this set of features in artefacts."""
@@ -209,7 +209,7 @@ def impulsive_time_of_flight(legs: Legs) -> NDArray[np.float64]:
     (n,) float64
         Days, on the fine grid; the shortest where several are equally good.
     """
-    from feasibility.classifier.paper.impulsive_kernels import cheapest_tof_batch
+    from feasibility.orbits.impulsive_kernels import cheapest_tof_batch
 
     if legs.arr_id is not None and (legs.arr_id >= 0).all():
         # A search proposes each pair with many flight times.

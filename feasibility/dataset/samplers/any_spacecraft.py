@@ -1,6 +1,6 @@
 """Sampler of legs of any spacecraft between any orbits of the inner solar system and the belt."""
 
-from typing import Annotated, final
+from typing import Annotated, ClassVar, final
 
 import msgspec
 import numpy as np
@@ -9,9 +9,8 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from feasibility.constants import AU, DAY_S, MU_SUN, mjd_to_mjd2000
-from feasibility.dataset.samplers.draws import Columns, Draw, collect
+from feasibility.dataset.samplers.draws import Columns, Draw, check_ranges, collect
 from feasibility.dataset.samplers.impulsive import ImpulsiveGrid
-from feasibility.dataset.samplers.random_pairs import check_ranges
 from feasibility.legs import Legs, Spacecraft
 from feasibility.orbits import Catalogue, cartesian_to_classical, classical_to_cartesian
 
@@ -71,6 +70,8 @@ class AnySpacecraft(
     dry_share : pair of float
         Dry mass over initial mass, uniform.
     """
+
+    draws_spacecraft: ClassVar[bool] = True
 
     start_mjd: _Range = (58849.0, 73459.0)
     a_au: _Range = (0.5, 6.0)

@@ -1,4 +1,4 @@
-"""`Draw`: legs as a sampler proposes them, before anything is solved."""
+"""`Draw`: legs as a sampler proposes them, before anything is solved; and what samplers share."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.errors import InputError
-from feasibility.legs import Legs
+from feasibility.legs import Legs, Spacecraft
+from feasibility.orbits import Catalogue
 
 Columns = dict[str, NDArray[Any]]
 
@@ -74,3 +75,36 @@ def collect(n: int, batch: Callable[[int], Columns]) -> Columns:
                 "expected limits that keep more of the catalogue's pairs"
             )
     return {name: np.concatenate([part[name] for part in parts])[:n] for name in parts[0]}
+
+
+def check_pairs(catalogue: Catalogue) -> None:
+    """Raise InputError where a catalogue has no pair of bodies."""
+    if len(catalogue) < 2:
+        raise InputError(
+            f"{catalogue.source}: {len(catalogue)} bodies, expected two or more to draw pairs"
+        )
+
+
+def check_ranges(**ranges: tuple[float, float]) -> None:
+    """Raise ValueError where a pair of numbers is not in order."""
+    for name, (low, high) in ranges.items():
+        if low > high:
+            raise ValueError(f"{name} = [{low:g}, {high:g}], expected the smaller number first")
+
+
+def legs_of_pairs(
+    catalogue: Catalogue, rows: Columns, m0: NDArray[np.float64], spacecraft: Spacecraft
+) -> Legs:
+    """Return the legs of drawn pairs: columns "dep", "arr" (rows), "t_dep" (MJD2000), "tof"."""
+    return Legs(
+        rv_dep=catalogue.states_at(rows["dep"], rows["t_dep"]),
+        rv_arr=catalogue.states_at(rows["arr"], rows["t_dep"] + rows["tof"]),
+        tof_days=rows["tof"],
+        m0=m0,
+        thrust=spacecraft.thrust,
+        isp=spacecraft.isp,
+        m_dry=spacecraft.m_dry,
+        t_dep_mjd2000=rows["t_dep"],
+        dep_id=catalogue.ids[rows["dep"]],
+        arr_id=catalogue.ids[rows["arr"]],
+    )

@@ -1,6 +1,6 @@
 """Sampler of random pairs of a catalogue: Table 1 of the paper, and pairs of similar orbits."""
 
-from typing import Annotated, final
+from typing import Annotated, ClassVar, final
 
 import msgspec
 import numpy as np
@@ -9,10 +9,16 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from feasibility.constants import mjd_to_mjd2000
-from feasibility.dataset.samplers.draws import Columns, Draw, collect
+from feasibility.dataset.samplers.draws import (
+    Columns,
+    Draw,
+    check_pairs,
+    check_ranges,
+    collect,
+    legs_of_pairs,
+)
 from feasibility.dataset.samplers.impulsive import ImpulsiveGrid
-from feasibility.errors import InputError
-from feasibility.legs import Legs, Spacecraft
+from feasibility.legs import Spacecraft
 from feasibility.orbits import Catalogue
 
 _Positive = Annotated[float, Meta(gt=0)]
@@ -47,6 +53,8 @@ class RandomPairs(
     max_de, max_di_deg : float, optional
         Largest differences of eccentricity and inclination of a pair.
     """
+
+    draws_spacecraft: ClassVar[bool] = False
 
     start_mjd: _Range = (58849.0, 73459.0)
     m0_kg: _Range = (1000.0, 3000.0)
@@ -111,36 +119,3 @@ class RandomPairs(
         if self.max_di_deg is not None:
             similar &= difference[:, 2] <= np.radians(self.max_di_deg)
         return similar
-
-
-def check_pairs(catalogue: Catalogue) -> None:
-    """Raise InputError where a catalogue has no pair of bodies."""
-    if len(catalogue) < 2:
-        raise InputError(
-            f"{catalogue.source}: {len(catalogue)} bodies, expected two or more to draw pairs"
-        )
-
-
-def check_ranges(**ranges: tuple[float, float]) -> None:
-    """Raise ValueError where a pair of numbers is not in order."""
-    for name, (low, high) in ranges.items():
-        if low > high:
-            raise ValueError(f"{name} = [{low:g}, {high:g}], expected the smaller number first")
-
-
-def legs_of_pairs(
-    catalogue: Catalogue, rows: Columns, m0: NDArray[np.float64], spacecraft: Spacecraft
-) -> Legs:
-    """Return the legs of drawn pairs: columns "dep", "arr" (rows), "t_dep" (MJD2000), "tof"."""
-    return Legs(
-        rv_dep=catalogue.states_at(rows["dep"], rows["t_dep"]),
-        rv_arr=catalogue.states_at(rows["arr"], rows["t_dep"] + rows["tof"]),
-        tof_days=rows["tof"],
-        m0=m0,
-        thrust=spacecraft.thrust,
-        isp=spacecraft.isp,
-        m_dry=spacecraft.m_dry,
-        t_dep_mjd2000=rows["t_dep"],
-        dep_id=catalogue.ids[rows["dep"]],
-        arr_id=catalogue.ids[rows["arr"]],
-    )

@@ -1,6 +1,6 @@
 """Sampler of the legs that a tour search asks about: near neighbours, short flights."""
 
-from typing import Annotated, final
+from typing import Annotated, ClassVar, final
 
 import msgspec
 import numpy as np
@@ -8,9 +8,8 @@ from msgspec import Meta
 from numpy.random import Generator
 
 from feasibility.constants import mjd_to_mjd2000
-from feasibility.dataset.samplers.draws import Draw
+from feasibility.dataset.samplers.draws import Draw, check_pairs, check_ranges, legs_of_pairs
 from feasibility.dataset.samplers.impulsive import ImpulsiveGrid
-from feasibility.dataset.samplers.random_pairs import check_pairs, check_ranges, legs_of_pairs
 from feasibility.legs import Spacecraft
 from feasibility.orbits import Catalogue, OrbitalNeighbours
 
@@ -56,6 +55,8 @@ class SearchCandidates(
     epoch_width_days : float
         Departures scatter evenly over this width about a neighbourhood epoch.
     """
+
+    draws_spacecraft: ClassVar[bool] = False
 
     start_mjd: _Range = (59215.0, 67249.5)
     m0_kg: _Range = (800.0, 2000.0)

@@ -1,8 +1,7 @@
-"""The training of one net of a margin model: a loop to be read from top to bottom."""
+"""The training of one net of a margin model: recipe, network, loss, and what an epoch is."""
 
-import hashlib
 import itertools
-import json
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -13,10 +12,18 @@ from numpy.typing import NDArray
 
 from feasibility.classifier.margin.network import INPUT_LIMIT
 from feasibility.errors import InputError
-from feasibility.runtime.atomic import atomic_path
+from feasibility.learning.training_loop import (
+    Checkpoint,
+    Learner,
+    LoopRule,
+    train_network,
+    training_identity,
+)
 from feasibility.runtime.extras import load_extra
 
 _Array = NDArray[np.float64]
+_Tensors = tuple[Any, Any, Any]
+"""Inputs (n, k), targets (n,) and weights (n,), as torch has them."""
 
 UNIT: Final = 0.02
 """Unit of the nets' corrections of logarithms: errors are of this order, and a fixed one keeps
@@ -48,7 +55,7 @@ class MarginRecipe:
     learning_rate : float
         Largest one.
     patience : int, optional
-        Stop when the validation loss has not fallen for so many epochs.
+        Stop when the validation loss has not fallen for this many epochs.
     seed : int
         Seed of split, weights and order.
     device : str
@@ -118,8 +125,35 @@ def fit_net(
     """Train one net to predict `error`, and return its arrays for `MarginNet`.
 
     Its second output is the mean absolute error to expect or, to `heed_outliers`, the root of
-    the mean square error. With `start`, the arrays of such a net, its weights and scales are
-    where the training begins.
+    the mean square error.
+
+    Parameters
+    ----------
+    X : (n, k) float64
+        Inputs.
+    error, weight : (n,) float64
+        What is to be predicted, and how much each row counts.
+    learned, validation : (a,), (b,) intp
+        Rows to learn from, and those that say which epoch's weights are kept.
+    recipe : MarginRecipe
+        How to train.
+    layers, width, epochs : int
+        In place of those of the recipe.
+    unit : float
+        Size of errors in which the net counts.
+    heed_outliers : bool
+        See above.
+    start : mapping of str to array, optional
+        Arrays of such a net: its weights and scales are where the training begins.
+    checkpoint, on_epoch
+        As for `train_margin`.
+
+    Raises
+    ------
+    InputError
+        As `train_network`.
+    MissingDependencyError
+        The extra ``train`` is not installed.
     """
     if start is not None and epochs == 0:
         return {name: array for name, array in start.items() if name != "settled"}
@@ -130,36 +164,19 @@ def fit_net(
     if device == "auto":
         device = "cuda" if torch.cuda.is_available() else "cpu"
     mean, std = X[learned].mean(axis=0), X[learned].std(axis=0) + 1e-6
-    if start is not None:
-        mean, std, unit = start["mean"], start["std"], float(start["unit"])
-
-    def on_device(rows: NDArray[np.intp]) -> tuple[Any, Any, Any]:
-        scaled = np.clip((X[rows] - mean) / std, -INPUT_LIMIT, INPUT_LIMIT)
-        values = (scaled, error[rows] / unit, weight[rows])
-        x, target, importance = (torch.from_numpy(v.astype(np.float32)) for v in values)
-        return x.to(device), target.to(device), importance.to(device)
-
-    inputs, targets, weights = on_device(learned)
-    held_out = on_device(validation)
     sizes = [X.shape[1], *[width] * layers]
     if start is not None:
+        mean, std, unit = start["mean"], start["std"], float(start["unit"])
         count = sum(name.startswith("weight_") for name in start)
         sizes = [start[f"weight_{i}"].shape[1] for i in range(count)]
-    modules: list[Any] = []
-    for before, after in itertools.pairwise(sizes):
-        modules += [torch.nn.Linear(before, after), torch.nn.SiLU()]
-    head = torch.nn.Linear(sizes[-1], 2)
-    torch.nn.init.zeros_(head.bias)
-    with torch.no_grad():
-        head.weight.mul_(0.1)
-    network = torch.nn.Sequential(*modules, head)
-    linear = [part for part in network if hasattr(part, "weight")]
-    if start is not None:
-        with torch.no_grad():
-            for i, part in enumerate(linear):
-                part.weight.copy_(torch.tensor(start[f"weight_{i}"]))
-                part.bias.copy_(torch.tensor(start[f"bias_{i}"]))
-    network = network.to(device)
+
+    def tensors(rows: NDArray[np.intp]) -> _Tensors:
+        scaled = np.clip((X[rows] - mean) / std, -INPUT_LIMIT, INPUT_LIMIT)
+        values = (scaled, error[rows] / unit, weight[rows])
+        x, target, importance = (torch.from_numpy(v.astype(np.float32)).to(device) for v in values)
+        return x, target, importance
+
+    network = _network(torch, sizes, start).to(device)
     optimiser = torch.optim.AdamW(
         network.parameters(), lr=recipe.learning_rate, weight_decay=_WEIGHT_DECAY
     )
@@ -167,82 +184,104 @@ def fit_net(
     schedule = torch.optim.lr_scheduler.OneCycleLR(
         optimiser, recipe.learning_rate, total_steps=epochs * batches, pct_start=_WARM_UP
     )
+    work = _Epochs(
+        recipe, network, optimiser, schedule, tensors(learned), tensors(validation), unit,
+        heed_outliers,
+    )  # fmt: skip
+    # A training may go on with other threads or elsewhere, though not to the last digit the same.
+    settings = {**asdict(recipe), "threads": None, "device": None, "sizes": sizes, "of": epochs}
+    data = (error[learned],) if start is None else (error[learned], start["weight_0"])
+    train_network(
+        Learner(network, optimiser, work.train, MarginEpoch, schedule),
+        LoopRule(
+            epochs,
+            recipe.patience,
+            best_loss=math.inf if start is None else work.validation_loss(),
+        ),
+        checkpoint=Checkpoint.at(checkpoint, lambda: training_identity(settings, *data)),
+        on_epoch=on_epoch,
+        replay=True,
+    )
+    return {"mean": mean, "std": std, "unit": np.array(unit), **_weights(network)}
 
-    def losses_of(batch: tuple[Any, Any, Any]) -> tuple[Any, Any]:
-        x, target, importance = batch
-        mean_out, scale_out = network(x).unbind(dim=1)
+
+@final
+@dataclass(frozen=True, eq=False)
+class _Epochs:
+    """What an epoch of a net is."""
+
+    recipe: MarginRecipe
+    network: Any
+    optimiser: Any
+    schedule: Any
+    learned: _Tensors
+    validation: _Tensors
+    unit: float
+    heed_outliers: bool
+
+    def train(self, number: int) -> MarginEpoch:
+        """Train for one epoch and return its record."""
+        torch, recipe = load_extra("torch"), self.recipe
+        count = len(self.learned[0])
+        batches = max(count // recipe.batch, 1)
+        # An own stream for each epoch, so that a resumed training sees the same order.
+        shuffled = np.random.default_rng([recipe.seed, 2, number]).permutation(count)
+        order = torch.from_numpy(shuffled).to(self.learned[0].device)
+        total = 0.0
+        for first in range(0, batches * recipe.batch, recipe.batch):
+            rows = order[first : first + recipe.batch]
+            loss, size_loss = self._losses(torch, *(column[rows] for column in self.learned))
+            self.optimiser.zero_grad()
+            (loss + _SIZE_WEIGHT * size_loss).backward()
+            torch.nn.utils.clip_grad_norm_(self.network.parameters(), _LARGEST_GRADIENT)
+            self.optimiser.step()
+            self.schedule.step()
+            total += loss.item()
+        return MarginEpoch(number, self.unit * total / batches, self.validation_loss())
+
+    def validation_loss(self) -> float:
+        """Return the loss on the validation rows."""
+        torch = load_extra("torch")
+        with torch.no_grad():
+            return self.unit * float(self._losses(torch, *self.validation)[0])
+
+    def _losses(self, torch: Any, x: Any, target: Any, importance: Any) -> tuple[Any, Any]:
+        mean_out, scale_out = self.network(x).unbind(dim=1)
         loss = torch.nn.functional.smooth_l1_loss(mean_out, target, beta=0.5, reduction="none")
         # The second output learns the size of the error that the first one makes: the
         # likelihood of a Laplace or a normal distribution.
         miss = (mean_out - target).abs().detach().clamp(max=_LARGEST_MISS)
-        if heed_outliers:
+        if self.heed_outliers:
             size_loss = scale_out + 0.5 * miss * miss * torch.exp(-2.0 * scale_out)
         else:
             size_loss = scale_out + miss * torch.exp(-scale_out)
         return (importance * loss).mean(), (importance * size_loss).mean()
 
-    # A training may go on with other threads or elsewhere, though not to the last digit the same.
-    settings = asdict(recipe) | {"threads": None, "device": None}
-    identity = hashlib.sha256(
-        json.dumps([settings, sizes, epochs]).encode()
-        + error[learned].tobytes()
-        + (b"" if start is None else start["weight_0"].tobytes())
-    ).hexdigest()
-    state: dict[str, Any] = {"epoch": 0, "best_epoch": 0, "best_loss": np.inf, "history": []}
-    best = {name: value.clone() for name, value in network.state_dict().items()}
-    if start is not None:
-        with torch.no_grad():
-            state["best_loss"] = float(losses_of(held_out)[0])
-    if checkpoint is not None and checkpoint.exists():
-        saved = torch.load(checkpoint, weights_only=True, map_location=device)
-        if saved["identity"] != identity:
-            raise InputError(f"{checkpoint}: of another training; remove it to begin anew")
-        network.load_state_dict(saved["network"])
-        optimiser.load_state_dict(saved["optimiser"])
-        schedule.load_state_dict(saved["schedule"])
-        best, state = saved["best"], saved["state"]
-        for epoch in state["history"]:
-            on_epoch(MarginEpoch(**epoch))
-    while state["epoch"] < epochs:
-        number = state["epoch"] + 1
-        if recipe.patience is not None and number - 1 - state["best_epoch"] >= recipe.patience:
-            break
-        # An own stream for each epoch, so that a resumed training sees the same order.
-        order = np.random.default_rng([recipe.seed, 2, number]).permutation(len(learned))
-        order = torch.from_numpy(order).to(device)
-        total = 0.0
-        for first in range(0, batches * recipe.batch, recipe.batch):
-            rows = order[first : first + recipe.batch]
-            loss, size_loss = losses_of((inputs[rows], targets[rows], weights[rows]))
-            optimiser.zero_grad()
-            (loss + _SIZE_WEIGHT * size_loss).backward()
-            torch.nn.utils.clip_grad_norm_(network.parameters(), _LARGEST_GRADIENT)
-            optimiser.step()
-            schedule.step()
-            total += loss.item()
-        with torch.no_grad():
-            held = float(losses_of(held_out)[0])
-        if held < state["best_loss"]:
-            state["best_loss"], state["best_epoch"] = held, number
-            best = {name: value.clone() for name, value in network.state_dict().items()}
-        state["epoch"] = number
-        done = MarginEpoch(number, unit * total / batches, unit * held)
-        state["history"].append(asdict(done))
-        on_epoch(done)
-        if checkpoint is not None:
-            content = {
-                "identity": identity,
-                "network": network.state_dict(),
-                "optimiser": optimiser.state_dict(),
-                "schedule": schedule.state_dict(),
-                "best": best,
-                "state": state,
-            }
-            with atomic_path(checkpoint) as temporary:
-                torch.save(content, temporary)
-    network.load_state_dict(best)
-    arrays = {"mean": mean, "std": std, "unit": np.array(unit)}
-    for i, part in enumerate(linear):
+
+def _network(torch: Any, sizes: list[int], start: Mapping[str, _Array] | None) -> Any:
+    """Return a net with layers of these sizes and two outputs; its weights are random or given."""
+    modules: list[Any] = []
+    for before, after in itertools.pairwise(sizes):
+        modules += [torch.nn.Linear(before, after), torch.nn.SiLU()]
+    head = torch.nn.Linear(sizes[-1], 2)
+    torch.nn.init.zeros_(head.bias)
+    with torch.no_grad():
+        head.weight.mul_(0.1)
+        network = torch.nn.Sequential(*modules, head)
+        if start is not None:
+            for i, part in enumerate(_linear(network)):
+                part.weight.copy_(torch.tensor(start[f"weight_{i}"]))
+                part.bias.copy_(torch.tensor(start[f"bias_{i}"]))
+    return network
+
+
+def _weights(network: Any) -> dict[str, _Array]:
+    arrays = {}
+    for i, part in enumerate(_linear(network)):
         arrays[f"weight_{i}"] = part.weight.detach().cpu().numpy().copy()
         arrays[f"bias_{i}"] = part.bias.detach().cpu().numpy().copy()
     return arrays
+
+
+def _linear(network: Any) -> list[Any]:
+    return [part for part in network if hasattr(part, "weight")]

@@ -49,6 +49,11 @@ class HardExamples(
         low, high = self.base.m0_kg
         return float(low), float(high)
 
+    @property
+    def draws_spacecraft(self) -> bool:
+        """Whether the base draws its own."""
+        return bool(self.base.draws_spacecraft)
+
     def draw(
         self,
         n: int,
@@ -59,13 +64,13 @@ class HardExamples(
     ) -> Draw:
         """Draw `n` legs; errors are those of the base and of loading the model."""
         draw: Draw = self.base.draw(n * self.factor, rng, catalogue, spacecraft, grid)
-        told = _load(self.model).predict(draw.legs)
-        m_star = told.margin * draw.legs.m0
+        prediction = _load(self.model).predict(draw.legs)
+        m_star = prediction.margin * draw.legs.m0
         with np.errstate(invalid="ignore"):
             relevant = (m_star > draw.m0_min * np.exp(-_RELEVANT)) & (
                 m_star < draw.m0_max * np.exp(_RELEVANT)
             )
-        doubt = np.where(relevant, np.nan_to_num(told.margin_error), 0.0)
+        doubt = np.where(relevant, np.nan_to_num(prediction.margin_error), 0.0)
         rows = np.sort(np.argsort(-doubt, kind="stable")[:n])
         return Draw(
             draw.legs.take(rows), draw.dt_imp_days[rows], draw.m0_min[rows], draw.m0_max[rows]

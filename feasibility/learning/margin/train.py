@@ -1,6 +1,6 @@
 """From datasets to a margin model: one program, to be read from top to bottom."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final, final
@@ -14,102 +14,28 @@ from feasibility.classifier.margin.calibration import (
     boundary_scores,
     fit_calibration,
 )
-from feasibility.classifier.margin.features import (
-    FEATURE_SET,
-    FEATURES,
-    domain_quantities,
-    log_acceleration,
-    margin_features,
-    quick_features,
-)
+from feasibility.classifier.margin.features import FEATURE_SET, FEATURES, domain_quantities
 from feasibility.classifier.margin.network import MarginNet
 from feasibility.dataset import Dataset
-from feasibility.dataset.folds import split_pairs
-from feasibility.dataset.pairs import pairs_of_bodies
+from feasibility.dataset.splits import split_pairs
 from feasibility.errors import InputError
+from feasibility.learning.margin.examples import MarginExamples
 from feasibility.learning.margin.fit import MarginEpoch, MarginRecipe, OnEpoch, fit_net
 from feasibility.runtime.provenance import provenance
 
 _Array = NDArray[np.float64]
 
-__all__ = ["SHARES", "MarginEpoch", "MarginExamples", "MarginRecipe", "OnEpoch", "train_margin"]
+__all__ = ["SHARES", "MarginEpoch", "MarginRecipe", "OnEpoch", "train_margin"]
 
 SHARES: Final = (0.85, 0.05, 0.1)
 """Shares of training, validation and calibration, split by pairs of bodies."""
 
-_RELEVANT: Final = 0.6
-"""Legs whose own margin is beyond this are learned with `_FAR_WEIGHT`: their m* hardly matters."""
-
-_FAR_WEIGHT: Final = 0.25
 _QUICK_LAYERS: Final = (2, 64)
 _QUICK_EPOCHS: Final = 24
 _QUICK_UNIT: Final = 0.05
 _SETTLED_TAIL: Final = 1e-3
 _SETTLED_SAFETY: Final = 1.05
 _DOMAIN_SLACK: Final = 0.03
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class MarginExamples:
-    """Solved legs as the nets see them; n of them.
-
-    Attributes
-    ----------
-    X, hint : (n, 80), (n,) float64
-        `margin_features`.
-    X_quick, quick_hint : (n, 40), (n,) float64
-        `quick_features`; the hint is NaN where there is none.
-    target : (n,) float64
-        `log_acceleration` at m*.
-    weight : (n,) float64
-        How much a leg counts.
-    pairs : (n,) int64
-        Number of the unordered pair of bodies.
-    """
-
-    X: _Array
-    hint: _Array
-    X_quick: _Array
-    quick_hint: _Array
-    target: _Array
-    weight: _Array
-    pairs: NDArray[np.int64]
-
-    @classmethod
-    def of(cls, datasets: Sequence[Dataset]) -> "MarginExamples":
-        """Compute features and targets of all legs with a known m*.
-
-        Raises
-        ------
-        InputError
-            A dataset was not labelled by margin.
-        """
-        parts = []
-        for dataset, pairs in zip(datasets, pairs_of_bodies(datasets), strict=True):
-            label = dataset.metadata["protocol"]["label"]
-            if label != "margin":
-                raise InputError(f"margin model: a dataset is labelled by {label}, not by margin")
-            columns = dataset.columns
-            legs = dataset.legs
-            X, hint = margin_features(legs)
-            X_quick, quick_hint = quick_features(legs)
-            target = log_acceleration(legs, columns["m_star_kg"])
-            known = np.isfinite(target) & np.isfinite(hint)
-            relevant = np.abs(columns["log_margin"]) < _RELEVANT
-            parts.append(
-                {
-                    "X": X[known],
-                    "hint": hint[known],
-                    "X_quick": X_quick[known],
-                    "quick_hint": quick_hint[known],
-                    "target": target[known],
-                    "weight": np.where(relevant, 1.0, _FAR_WEIGHT)[known],
-                    "pairs": pairs[known],
-                }
-            )
-        whole = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-        return cls(**whole)
 
 
 def train_margin(
@@ -154,18 +80,8 @@ def train_margin(
     """
     if start is None and not recipe.epochs:
         raise InputError("margin epochs: 0, expected 1 or more without a model to start from")
-    first_net, first_quick = (
-        (None, None) if start is None else (start.section("model"), start.section("quick") or None)
-    )
     examples = MarginExamples.of(datasets)
-    rng = np.random.default_rng([recipe.seed, 0])
-    part = split_pairs(examples.pairs, SHARES, rng)
-    learned, validation, calibration = (np.flatnonzero(part == k) for k in range(3))
-    if len(learned) < recipe.batch:
-        raise InputError(
-            f"margin model: {len(learned)} legs to learn from, expected at least one batch of "
-            f"{recipe.batch}; generate more legs"
-        )
+    parts = _Parts.of(examples, recipe)
     epochs: list[MarginEpoch] = []
 
     def note(epoch: MarginEpoch) -> None:
@@ -173,71 +89,38 @@ def train_margin(
         if on_epoch is not None:
             on_epoch(epoch)
 
-    error = examples.target - examples.hint
-    net = fit_net(
-        examples.X, error, examples.weight, learned, validation, recipe,
-        layers=recipe.layers, width=recipe.width, epochs=recipe.epochs,
-        start=first_net, checkpoint=checkpoint, on_epoch=note,
-    )  # fmt: skip
-    quick_epochs = recipe.quick_epochs
-    if quick_epochs is None:
-        quick_epochs = _QUICK_EPOCHS if recipe.epochs else 0
-    rough = np.isfinite(examples.quick_hint)
-    quick_error = examples.target - examples.quick_hint
-    quick = fit_net(
-        examples.X_quick, quick_error, examples.weight, learned[rough[learned]],
-        validation[rough[validation]], recipe,
-        layers=_QUICK_LAYERS[0], width=_QUICK_LAYERS[1],
-        epochs=quick_epochs, unit=_QUICK_UNIT, heed_outliers=True, start=first_quick,
-    )  # fmt: skip
-
+    net, quick = _fit_nets(examples, parts, recipe, start, checkpoint, note)
     # Estimates of log m* and what is wrong with them: a larger acceleration is a smaller m*.
-    correction, expected = MarginNet(net)(examples.X[calibration])
-    residual = correction - error[calibration]
+    error = examples.error[parts.calibration]
+    correction, expected = MarginNet(net)(examples.X[parts.calibration])
+    residual = correction - error
     table = fit_calibration(residual, expected)
-    rows = calibration[rough[calibration]]
-    quick_correction, quick_expected = MarginNet(quick)(examples.X_quick[rows])
-    quick_residual = (quick_correction - quick_error[rows]) / quick_expected
-    settled = _SETTLED_SAFETY * np.quantile(quick_residual, [_SETTLED_TAIL, 1.0 - _SETTLED_TAIL])
-    quantities = np.concatenate(
-        [
-            domain_quantities(examples.X[learned]),
-            domain_quantities(examples.X_quick[learned[rough[learned]]]),
-        ]
+    scores = boundary_scores(
+        Calibration(table), residual, expected, np.random.default_rng([recipe.seed, 1])
     )
-    low, high = quantities.min(axis=0), quantities.max(axis=0)
-    slack = _DOMAIN_SLACK * (high - low) + 1e-9
-    low, high = low - slack, high + slack
-    if start is not None and first_quick is not None:
-        domain = start.section("domain")
-        low, high = np.minimum(low, domain["low"]), np.maximum(high, domain["high"])
-        # Few calibration legs see few outliers: what was needed before is needed still.
-        known = first_quick["settled"]
-        settled = np.array([min(settled[0], known[0]), max(settled[1], known[1])])
-    final_mass = {} if start is None else start.section("final_mass")
+    sections: dict[str, Mapping[str, _Array]] = {
+        "model": net,
+        "quick": {**quick, "settled": _settled(examples, parts, quick, start)},
+        "domain": _domain(examples, parts, start),
+        "calibration": {**table, "positive_scores": scores},
+        "final_mass": {} if start is None else start.section("final_mass"),
+    }
     return Artefact(
         kind="margin",
         feature_set=FEATURE_SET,
         features=FEATURES,
         units=("",) * len(FEATURES),
         arrays={
-            **{f"model/{name}": array for name, array in net.items()},
-            **{f"quick/{name}": array for name, array in quick.items()},
-            "quick/settled": settled,
-            "domain/low": low,
-            "domain/high": high,
-            **{f"calibration/{name}": array for name, array in table.items()},
-            **{f"final_mass/{name}": array for name, array in final_mass.items()},
-            "calibration/positive_scores": boundary_scores(
-                Calibration(table), residual, expected, np.random.default_rng([recipe.seed, 1])
-            ),
+            f"{section}/{name}": array
+            for section, arrays in sections.items()
+            for name, array in arrays.items()
         },
         config={
             "recipe": asdict(recipe),
             "legs": {
-                "training": len(learned),
-                "validation": len(validation),
-                "calibration": len(calibration),
+                "training": len(parts.learned),
+                "validation": len(parts.validation),
+                "calibration": len(parts.calibration),
             },
             "epochs": [asdict(epoch) for epoch in epochs],
         },
@@ -245,7 +128,7 @@ def train_margin(
             "calibration": {
                 "median_absolute_log_error": float(np.median(np.abs(residual))),
                 "mean_absolute_log_error": float(np.mean(np.abs(residual))),
-                "hint_median_absolute_log_error": float(np.median(np.abs(error[calibration]))),
+                "hint_median_absolute_log_error": float(np.median(np.abs(error))),
             }
         },
         provenance={
@@ -254,6 +137,102 @@ def train_margin(
             **({} if start is None else {"start": dict(start.provenance)}),
         },
     )
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class _Parts:
+    """Rows of the three parts, all of them or those with a rough hint."""
+
+    learned: NDArray[np.intp]
+    validation: NDArray[np.intp]
+    calibration: NDArray[np.intp]
+
+    @classmethod
+    def of(cls, examples: MarginExamples, recipe: MarginRecipe) -> "_Parts":
+        """Split by pairs of bodies.
+
+        Raises
+        ------
+        InputError
+            The legs to learn from do not fill a batch.
+        """
+        part = split_pairs(examples.pairs, SHARES, np.random.default_rng([recipe.seed, 0]))
+        parts = cls(*(np.flatnonzero(part == k) for k in range(3)))
+        if len(parts.learned) < recipe.batch:
+            raise InputError(
+                f"margin model: {len(parts.learned)} legs to learn from, expected at least one "
+                f"batch of {recipe.batch}; generate more legs"
+            )
+        return parts
+
+    def rough(self, examples: MarginExamples) -> "_Parts":
+        """Return the rows with a rough hint."""
+        has_hint = np.isfinite(examples.quick_hint)
+        return _Parts(
+            *(rows[has_hint[rows]] for rows in (self.learned, self.validation, self.calibration))
+        )
+
+
+def _fit_nets(
+    examples: MarginExamples,
+    parts: _Parts,
+    recipe: MarginRecipe,
+    start: Artefact | None,
+    checkpoint: Path | None,
+    on_epoch: OnEpoch,
+) -> tuple[dict[str, _Array], dict[str, _Array]]:
+    """Return the arrays of the net and of the quick one."""
+    net = fit_net(
+        examples.X, examples.error, examples.weight, parts.learned, parts.validation, recipe,
+        layers=recipe.layers, width=recipe.width, epochs=recipe.epochs,
+        start=None if start is None else start.section("model"),
+        checkpoint=checkpoint, on_epoch=on_epoch,
+    )  # fmt: skip
+    epochs = recipe.quick_epochs
+    if epochs is None:
+        epochs = _QUICK_EPOCHS if recipe.epochs else 0
+    rough = parts.rough(examples)
+    quick = fit_net(
+        examples.X_quick, examples.quick_error, examples.weight, rough.learned, rough.validation,
+        recipe,
+        layers=_QUICK_LAYERS[0], width=_QUICK_LAYERS[1], epochs=epochs, unit=_QUICK_UNIT,
+        heed_outliers=True, start=None if start is None else start.section("quick") or None,
+    )  # fmt: skip
+    return net, quick
+
+
+def _settled(
+    examples: MarginExamples, parts: _Parts, quick: dict[str, _Array], start: Artefact | None
+) -> _Array:
+    """Return (2,) errors of the quick net, in its own expectation, that are hardly exceeded."""
+    rows = parts.rough(examples).calibration
+    correction, expected = MarginNet(quick)(examples.X_quick[rows])
+    residual = (correction - examples.quick_error[rows]) / expected
+    settled = _SETTLED_SAFETY * np.quantile(residual, [_SETTLED_TAIL, 1.0 - _SETTLED_TAIL])
+    known = {} if start is None else start.section("quick")
+    if not known:
+        return settled
+    # Few calibration legs see few outliers: what was needed before is needed still.
+    low, high = known["settled"]
+    return np.array([min(settled[0], low), max(settled[1], high)])
+
+
+def _domain(examples: MarginExamples, parts: _Parts, start: Artefact | None) -> dict[str, _Array]:
+    """Return the ranges of the legs learned from, and of those of the model begun with."""
+    quantities = np.concatenate(
+        [
+            domain_quantities(examples.X[parts.learned]),
+            domain_quantities(examples.X_quick[parts.rough(examples).learned]),
+        ]
+    )
+    low, high = quantities.min(axis=0), quantities.max(axis=0)
+    slack = _DOMAIN_SLACK * (high - low) + 1e-9
+    low, high = low - slack, high + slack
+    if start is not None and start.section("quick"):
+        domain = start.section("domain")
+        low, high = np.minimum(low, domain["low"]), np.maximum(high, domain["high"])
+    return {"low": low, "high": high}
 
 
 def _record(dataset: Dataset) -> dict[str, Any]:

@@ -17,8 +17,7 @@ from feasibility.classifier.margin.final_mass import (
 )
 from feasibility.classifier.margin.network import MarginNet
 from feasibility.dataset import Dataset
-from feasibility.dataset.folds import split_pairs
-from feasibility.dataset.pairs import pairs_of_bodies
+from feasibility.dataset.splits import pairs_of_bodies, split_pairs
 from feasibility.errors import InputError
 from feasibility.learning.margin.fit import UNIT, MarginRecipe, OnEpoch, fit_net
 

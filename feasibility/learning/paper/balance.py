@@ -1,8 +1,6 @@
-"""Balance of the classes: ADASYN for training folds, subsets for balanced tests."""
+"""Balance of the classes: ADASYN for training rows, subsets for balanced tests."""
 
-from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import Final, final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +17,7 @@ def adasyn(
     """Add synthetic rows of the smaller class, more where it is hard to learn.
 
     For training rows only: a synthetic row is a mixture of its neighbours, and
-    would carry them into whatever it is tested on. `training_folds` sees to it.
+    would carry them into whatever it is tested on: split first, then balance.
 
     Parameters
     ----------
@@ -88,53 +86,3 @@ def balanced_rows(
         size = min(size, most // 2)
     chosen = [rng.choice(rows, size, replace=False) for rows in (feasible, infeasible)]
     return np.sort(np.concatenate(chosen)).astype(np.int64)
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class TrainingFold:
-    """One fold of a cross-validation.
-
-    Attributes
-    ----------
-    X, y
-        Training rows, (m, k) and (m,), balanced if asked for.
-    train_rows, validation_rows : (a,), (b,) int64
-        Rows of the whole set; the first a rows of `X` are ``train_rows``.
-    """
-
-    X: NDArray[np.float64]
-    y: NDArray[np.bool_]
-    train_rows: NDArray[np.int64]
-    validation_rows: NDArray[np.int64]
-
-
-def training_folds(
-    X: NDArray[np.float64],
-    y: NDArray[np.bool_],
-    folds: NDArray[np.int64],
-    rng: np.random.Generator,
-    *,
-    balance: bool,
-) -> Iterator[TrainingFold]:
-    """Yield each fold with its training rows, balanced by ADASYN after the split if asked for.
-
-    Parameters
-    ----------
-    X : (n, k) float64
-        Standardised features.
-    y : (n,) bool
-        Labels.
-    folds : (n,) int64
-        Fold of each row, from `folds.pair_folds`.
-    rng : numpy.random.Generator
-        For ADASYN.
-    balance : bool
-        Whether to add synthetic training rows.
-    """
-    for fold in np.unique(folds):
-        train = np.flatnonzero(folds != fold)
-        X_train, y_train = X[train], y[train]
-        if balance:
-            X_train, y_train = adasyn(X_train, y_train, rng)
-        yield TrainingFold(X_train, y_train, train, np.flatnonzero(folds == fold))

@@ -12,7 +12,7 @@ from feasibility.classifier.artefact import Artefact
 from feasibility.classifier.paper.features import FEATURE_SET, FEATURES, paper_features
 from feasibility.classifier.paper.standardise import Standardiser
 from feasibility.dataset import Dataset
-from feasibility.dataset.folds import pair_ids, split_pairs
+from feasibility.dataset.splits import pair_ids, split_pairs
 from feasibility.errors import InputError
 from feasibility.evaluation.metrics import summary
 from feasibility.learning.paper.balance import adasyn
@@ -75,7 +75,7 @@ class Examples:
     X : (n, 103) float64
         `paper_features`, not standardised.
     y : (n,) bool
-        Whether the leg is feasible.
+        Whether the leg is flyable.
     pairs : (n,) int64
         Number of the unordered pair of bodies.
     rows : (n,) int64
@@ -89,11 +89,7 @@ class Examples:
 
     @classmethod
     def of(cls, dataset: Dataset) -> "Examples":
-        """Compute features and labels of the rows whose label is known.
-
-        The label is m0 <= m* or, where the dataset was labelled by convergence, whether the
-        optimisation converged.
-        """
+        """Compute features and labels (`Dataset.flyable`) of the rows whose label is known."""
         rows = np.flatnonzero(dataset.labelled)
         part = dataset.take(rows)
         columns = part.columns
@@ -103,15 +99,8 @@ class Examples:
             lambert_dv=columns["lambert_dv_m_s"],
         )
         return cls(
-            X, labels(part), pair_ids(columns["dep_id"], columns["arr_id"]), rows.astype(np.int64)
+            X, part.flyable, pair_ids(columns["dep_id"], columns["arr_id"]), rows.astype(np.int64)
         )
-
-
-def labels(dataset: Dataset) -> NDArray[np.bool_]:
-    """Return (n,) whether each leg is feasible: m0 <= m*, or converged in the paper's sense."""
-    if dataset.metadata["protocol"]["label"] == "convergence":
-        return dataset.feasible
-    return np.asarray(dataset.columns["log_margin"] >= 0.0)
 
 
 def train(
@@ -151,17 +140,7 @@ def train(
     examples = Examples.of(dataset)
     part = split_pairs(examples.pairs, SHARES, streams[0])
     learned, validation, calibration = (np.flatnonzero(part == k) for k in range(3))
-    for name, rows in (
-        ("training", learned),
-        ("validation", validation),
-        ("calibration", calibration),
-    ):
-        feasible = int(examples.y[rows].sum())
-        if feasible in (0, len(rows)):
-            raise InputError(
-                f"{name} part: {feasible} of {len(rows)} legs are feasible, expected both "
-                "classes; generate more legs"
-            )
+    _check_classes(examples.y, training=learned, validation=validation, calibration=calibration)
 
     columns = np.arange(len(FEATURES))
     if recipe.n_features < len(FEATURES):
@@ -216,6 +195,17 @@ def train(
         },
         provenance={**provenance(), "dataset": dict(dataset.metadata)},
     )
+
+
+def _check_classes(y: NDArray[np.bool_], **parts: NDArray[np.intp]) -> None:
+    """Raise InputError where a part, by its name, lacks a class."""
+    for name, rows in parts.items():
+        feasible = int(y[rows].sum())
+        if feasible in (0, len(rows)):
+            raise InputError(
+                f"{name} part: {feasible} of {len(rows)} legs are feasible, expected both "
+                "classes; generate more legs"
+            )
 
 
 def _domain(

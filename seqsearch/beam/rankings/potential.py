@@ -23,7 +23,7 @@ _CELL_MASS: Final = 0.04
 
 @final
 class PotentialRanking:
-    """Adds to another ranking a penalty for nodes with few ways on.
+    """Adds to another ranking a penalty for nodes from which few targets can be reached.
 
     The predictor is asked for the legs from the node's body to its nearest
     bodies. The answer is shared by all nodes at the same body, within the same

@@ -1,7 +1,7 @@
 """What a predictor expects of launches, self-fly-bys and transfers from one node.
 
-Questions that only shape and order the ways go to the predictor's quick
-answers, a few percent off; one good answer a way corrects them.
+Questions that only shape and order the hops go to the predictor's quick
+answers, a few percent off; one good answer for each hop corrects them.
 """
 
 from collections.abc import Callable
@@ -49,7 +49,7 @@ _FINALISTS: Final = 3
 """Directions of a fly-by for which the margin is asked over the flight time."""
 
 _LEVELS: Final = (0.02, 0.12, 0.3, 0.55, 0.85)
-"""log(m*/m0) of the ways to a target: the shortest, and longer ones that save propellant."""
+"""log(m*/m0) of the flights to a target: the shortest, and longer ones that save propellant."""
 
 _NOWHERE: Final = -5.0
 """log(m*/m0) of legs of which nothing is known."""
@@ -57,7 +57,7 @@ _NOWHERE: Final = -5.0
 
 @final
 class Gtoc5Forecast:
-    """Finds the promising ways on from a node.
+    """Finds the promising hops from a node.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ class Gtoc5Forecast:
         self._directions = even_directions(_DIRECTIONS)
 
     def launches(self, row: int, t: float, mass: float) -> TransferPlans | None:
-        """Return ways from the Earth to first asteroids, launched along Lambert's arc.
+        """Return transfers from the Earth to first asteroids, launched along Lambert's arc.
 
         Parameters
         ----------
@@ -112,7 +112,7 @@ class Gtoc5Forecast:
 
         curves = self._curves(np.arange(len(target)), legs)
         best = _earliest(curves.shortest(0.0), _TARGETS)
-        found = self._ways(curves.take(best), lambda pair, tof: legs(best[pair], tof))
+        found = self._timed(curves.take(best), lambda pair, tof: legs(best[pair], tof))
         if found is None:
             return None
         pair, tof = found
@@ -125,7 +125,7 @@ class Gtoc5Forecast:
         )
 
     def hops(self, row: int, t: float, mass: float, visited: _Rows) -> TransferPlans | None:
-        """Return ways from rest at an asteroid, past it in a fly-by, to rest at others.
+        """Return hops from rest at an asteroid, past it in a fly-by, to rest at others.
 
         Parameters
         ----------
@@ -161,20 +161,20 @@ class Gtoc5Forecast:
         pair = np.repeat(np.arange(len(target)), _FINALISTS)
         course = finalist.ravel()
 
-        def legs(way: _Rows, tof: _Array) -> Legs:
-            j = course[way]
-            return self._transfers(row, t + wait[j], velocity[j], target[pair[way]], tof, left)
+        def legs(option: _Rows, tof: _Array) -> Legs:
+            j = course[option]
+            return self._transfers(row, t + wait[j], velocity[j], target[pair[option]], tof, left)
 
         curves = self._curves(np.arange(len(pair)), legs)
         arrival = (wait[course] + curves.shortest(_LEVELS[0])).reshape(-1, _FINALISTS)
         arrival = np.where(np.isfinite(arrival), arrival, np.inf)
-        way = np.arange(len(target)) * _FINALISTS + arrival.argmin(axis=1)
-        way = way[np.isfinite(arrival.min(axis=1))]
-        found = self._ways(curves.take(way), lambda k, tof: legs(way[k], tof))
+        option = np.arange(len(target)) * _FINALISTS + arrival.argmin(axis=1)
+        option = option[np.isfinite(arrival.min(axis=1))]
+        found = self._timed(curves.take(option), lambda k, tof: legs(option[k], tof))
         if found is None:
             return None
         k, tof = found
-        chosen = way[k]
+        chosen = option[k]
         return TransferPlans(
             target=target[pair[chosen]],
             fly_by_days=wait[course[chosen]],
@@ -268,7 +268,7 @@ class Gtoc5Forecast:
         chosen: _Rows = open_[order]
         return chosen
 
-    def _ways(
+    def _timed(
         self, curves: MarginCurves, legs: Callable[[_Rows, _Array], Legs]
     ) -> tuple[_Rows, _Array] | None:
         """Return pairs and flight times at each level of margin, by good answers, or None."""

@@ -4,7 +4,7 @@ from typing import Self, final
 
 import msgspec
 
-from seqsearch.tours.checks import MASS_TOLERANCE_KG, Check, FlownTour
+from seqsearch.tours.checks import MASS_TOLERANCE_KG, Check, FlownTour, largest
 
 
 @final
@@ -36,12 +36,9 @@ class Drop(
 
     def checks(self, flown: FlownTour, /) -> list[Check]:
         """Return the check of the masses."""
-        unlike = max(
-            (
-                abs(leg.dropped_kg - (self.fly_by_kg if leg.is_fly_by else self.rendezvous_kg))
-                for leg in flown.legs
-            ),
-            default=0.0,
+        unlike = largest(
+            abs(leg.dropped_kg - (self.fly_by_kg if leg.is_fly_by else self.rendezvous_kg))
+            for leg in flown.legs
         )
         return [
             Check(

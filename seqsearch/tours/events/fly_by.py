@@ -6,7 +6,13 @@ from typing import Self, final
 import msgspec
 import numpy as np
 
-from seqsearch.tours.checks import TIME_TOLERANCE_DAYS, Check, FlownTour
+from seqsearch.tours.checks import (
+    TIME_TOLERANCE_DAYS,
+    Check,
+    FlownTour,
+    largest,
+    smallest,
+)
 from seqsearch.tours.records import TourLeg
 
 
@@ -40,21 +46,15 @@ class FlyBy(
     def checks(self, flown: FlownTour, /) -> list[Check]:
         """Return the checks of which bodies are passed, how fast, and without a stay after it."""
         astray = self._astray(flown.legs)
-        wait = max(
-            (
-                abs(following.t_dep_mjd2000 - leg.t_arr_mjd2000)
-                for leg, following in pairwise(flown.legs)
-                if leg.is_fly_by
-            ),
-            default=0.0,
+        wait = largest(
+            abs(following.t_dep_mjd2000 - leg.t_arr_mjd2000)
+            for leg, following in pairwise(flown.legs)
+            if leg.is_fly_by
         )
-        slowest = min(
-            (
-                float(np.linalg.norm(arrival.reached[3:] - arrival.target[3:]))
-                for leg, arrival in zip(flown.legs, flown.arrivals, strict=True)
-                if leg.is_fly_by and arrival is not None
-            ),
-            default=np.inf,
+        slowest = smallest(
+            float(np.linalg.norm(arrival.reached[3:] - arrival.target[3:]))
+            for leg, arrival in zip(flown.legs, flown.arrivals, strict=True)
+            if leg.is_fly_by and arrival is not None
         )
         return [
             Check(

@@ -15,7 +15,7 @@ from feasibility.classifier.classifier import FeasibilityClassifier
 from feasibility.constants import AU
 from feasibility.evaluation.metrics import auc
 from feasibility.learning.paper.models import KINDS
-from feasibility.learning.paper.train import Examples, Recipe, labels, train
+from feasibility.learning.paper.train import Examples, Recipe, train
 from feasibility.pruners.classifier import ClassifierPruner
 from tests.helpers.labelled import labelled_dataset
 
@@ -59,7 +59,7 @@ def other():
 def test_a_loaded_model_answers_as_the_one_that_was_trained(artefact, classifier, other):
     before = FeasibilityClassifier(artefact).feasible_probability(other.legs)
     assert np.abs(classifier.feasible_probability(other.legs) - before).max() < 1e-12
-    assert auc(labels(other), before) > (0.6 if artefact.kind == "knn" else 0.75)
+    assert auc(other.flyable, before) > (0.6 if artefact.kind == "knn" else 0.75)
 
 
 def test_the_artefact_says_what_it_needs_and_how_it_was_made(artefact):
@@ -230,7 +230,7 @@ def test_the_papers_label_is_convergence():
         columns=dict(dataset.columns) | {"status": status},
         metadata=dict(dataset.metadata) | {"protocol": protocol},
     )
-    assert np.array_equal(labels(random_start), np.arange(1500) % 2 == 0)
+    assert np.array_equal(random_start.flyable, np.arange(1500) % 2 == 0)
 
 
 @pytest.mark.parametrize("changes", [{"n_features": 0}, {"n_features": 104}, {"balance": "x"}])

@@ -178,12 +178,14 @@ def test_feasible_is_a_known_margin_of_at_least_zero_and_enough_propellant():
     dry["status"] = dry["status"].copy()
     dry["status"][flyable] = Status.BELOW_DRY_MASS
     assert not Dataset(dry, data.metadata).feasible[flyable]
+    np.testing.assert_array_equal(Dataset(dry, data.metadata).flyable, data.feasible)
 
 
 def test_a_convergence_label_is_the_solvers_status():
     data = dataset(300, label="convergence")
     assert data.labelled.all()
     np.testing.assert_array_equal(data.feasible, data.columns["status"] == Status.CONVERGED)
+    np.testing.assert_array_equal(data.flyable, data.feasible)
 
 
 @settings(deadline=None, max_examples=60)

@@ -1,6 +1,8 @@
 """Samplers draw what their protocols say."""
 
+from dataclasses import dataclass
 from pathlib import Path
+from typing import ClassVar
 
 import msgspec
 import numpy as np
@@ -10,15 +12,19 @@ from hypothesis import strategies as st
 
 from feasibility import InputError
 from feasibility.constants import AU, DAY_S, MU_SUN, mjd_to_mjd2000
-from feasibility.dataset import Protocol, builtin_protocols, read_protocol
-from feasibility.dataset.samplers.draws import Draw, collect
-from feasibility.dataset.samplers.impulsive import ImpulsiveGrid, lowest_delta_v
+from feasibility.dataset import Protocol, begin, builtin_protocols, read_dataset, read_protocol
+from feasibility.dataset.protocol import CatalogueTable, SpacecraftTable
+from feasibility.dataset.samplers.draws import Draw, collect, legs_of_pairs
+from feasibility.dataset.samplers.impulsive import ImpulsiveGrid
+from feasibility.dataset.samplers.protocol import Sampler
+from feasibility.dataset.samplers.random_pairs import RandomPairs
 from feasibility.orbits import (
     Catalogue,
     cartesian_to_classical,
     orbital_metric,
     synthetic_main_belt,
 )
+from feasibility.orbits.lambert import lambert_delta_v
 from feasibility.runtime.pykep_guard import load_pykep
 
 BELT = synthetic_main_belt(300, np.random.default_rng(3))
@@ -107,16 +113,27 @@ def pykep_delta_v(dep: int, arr: int, t_dep: float, tof_days: float) -> float:
 
 
 def test_the_grid_has_both_ends_and_refines_within_them():
-    grid = ImpulsiveGrid(tof_days_min=60, tof_days_max=200, step_days=50)
-    np.testing.assert_array_equal(grid.coarse(), [60, 110, 160, 200])
+    grid = ImpulsiveGrid(tof_days_min=60, tof_days_max=900, step_days=400, fine_step_days=200)
+    n = len(BELT) - 1
+    dep, arr, t_dep = np.arange(n), np.arange(n) + 1, np.full(n, 8000.0)
+    best = grid.best_tof_days(BELT, dep, arr, t_dep)
 
+    def cheapest(times):
+        costs = [
+            lambert_delta_v(
+                BELT.states_at(dep, t_dep), BELT.states_at(arr, t_dep + time), time * DAY_S, 1
+            )
+            for time in times
+        ]
+        return np.asarray(times)[np.argmin(costs, axis=0)]
 
-def test_delta_v_of_a_coasting_leg_is_zero():
-    # Half a period lies in every plane; a third does not.
-    state = BELT.states(8000.0)[:5]
-    later = BELT.states_at(np.arange(5), 8000.0 + BELT.period_days[:5] / 3)
-    cost = lowest_delta_v(state, later, BELT.period_days[:5] / 3, 2)
-    np.testing.assert_allclose(cost, 0.0, atol=1e-5)
+    rough = cheapest([60.0, 460.0, 860.0, 900.0])
+    assert {460.0, 860.0, 900.0} <= set(rough)
+    around = {60.0: (60, 260, 460), 460.0: (60, 260, 460, 660, 860)}
+    around |= {860.0: (460, 660, 860, 900), 900.0: (500, 700, 900)}
+    for centre, times in around.items():
+        rows = rough == centre
+        np.testing.assert_array_equal(best[rows], cheapest([float(t) for t in times])[rows])
 
 
 @settings(deadline=None, max_examples=10)
@@ -290,3 +307,45 @@ def test_independent_orbits_have_time_for_the_transfer():
     dep, arr = cartesian_to_classical(legs.rv_dep), cartesian_to_classical(legs.rv_arr)
     hohmann_s = np.pi * np.sqrt(((dep[:, 0] + arr[:, 0]) / 2) ** 3 / MU_SUN)
     assert (legs.tof_s >= 0.6 * hohmann_s * (1 - 1e-9)).all()
+
+
+@dataclass(frozen=True)
+class Neighbours:
+    """A sampler of somebody else: from each body to the next of the table."""
+
+    tof_days: float
+    m0_kg: tuple[float, float] = (900.0, 900.0)
+    draws_spacecraft: ClassVar[bool] = False
+
+    def draw(self, n, rng, catalogue, spacecraft, grid) -> Draw:
+        dep = rng.integers(0, len(catalogue) - 1, n)
+        rows = {"dep": dep, "arr": dep + 1, "t_dep": np.full(n, 8000.0)}
+        rows["tof"] = np.full(n, self.tof_days)
+        mass = np.full(n, 900.0)
+        return Draw(
+            legs_of_pairs(catalogue, rows, mass, spacecraft), np.full(n, np.nan), mass, mass
+        )
+
+
+def test_a_sampler_of_ones_own_makes_a_dataset_that_is_resumed_by_an_equal_one_only(tmp_path):
+    def protocol(sampler: Sampler) -> Protocol:
+        return Protocol(
+            name="neighbours",
+            sampler=sampler,
+            spacecraft=SpacecraftTable(dry_mass_kg=500, thrust_n=0.3, isp_s=3000),
+            catalogue=CatalogueTable(synthetic_bodies=50),
+            propellant=False,
+            legs_per_shard=3,
+        )
+
+    begin(protocol(Neighbours(400.0)), 3, tmp_path).run()
+    begin(protocol(Neighbours(400.0)), 6, tmp_path).run()
+    data = read_dataset(tmp_path)
+    assert (data.legs.arr_id == data.legs.dep_id + 1).all()
+    assert data.metadata["protocol"]["sampler"]["kind"].endswith("test_samplers.Neighbours")
+    with pytest.raises(InputError, match=r"protocol\.sampler\.tof_days = 400\.0, now 500\.0"):
+        begin(protocol(Neighbours(500.0)), 6, tmp_path)
+    with pytest.raises(InputError, match=r"sampler\.kind = .*Neighbours, now random-pairs"):
+        begin(protocol(RandomPairs(m0_kg=(900.0, 900.0))), 6, tmp_path)
+    with pytest.raises(ValueError, match="below dry_mass_kg"):
+        protocol(Neighbours(400.0, m0_kg=(400.0, 900.0)))

@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from feasibility import InputError
-from feasibility.dataset.folds import pair_folds, pair_ids, split_pairs
-from feasibility.learning.paper.balance import adasyn, balanced_rows, training_folds
+from feasibility.dataset import pair_ids, split_pairs
+from feasibility.learning.paper.balance import adasyn, balanced_rows
 
 
 @st.composite
@@ -16,49 +16,6 @@ def bodies(draw):
     n = draw(st.integers(20, 80))
     ids = st.lists(st.integers(1, 9), min_size=n, max_size=n)
     return np.array(draw(ids)), np.array(draw(ids))
-
-
-def unordered(dep, arr, rows):
-    return {frozenset(pair) for pair in zip(dep[rows].tolist(), arr[rows].tolist(), strict=True)}
-
-
-@given(bodies(), st.integers(0, 1000))
-def test_both_directions_of_a_pair_are_in_one_fold_and_no_fold_is_empty(ends, seed):
-    dep, arr = ends
-    pairs = pair_ids(dep, arr)
-    if pairs.max() < 4:
-        return
-    folds = pair_folds(pairs, 5, np.random.default_rng(seed))
-    assert set(folds) == set(range(5))
-    for fold in range(5):
-        inside, outside = folds == fold, folds != fold
-        assert not unordered(dep, arr, inside) & unordered(dep, arr, outside)
-
-
-def test_folds_are_of_nearly_equal_size():
-    rng = np.random.default_rng(0)
-    pairs = pair_ids(rng.integers(0, 60, 5000), rng.integers(0, 60, 5000))
-    sizes = np.bincount(pair_folds(pairs, 5, rng))
-    assert sizes.min() > 950
-    assert sizes.max() < 1050
-
-
-def test_parts_have_their_shares():
-    parts = split_pairs(np.arange(10_000), (0.8, 0.1, 0.1), np.random.default_rng(0))
-    assert np.bincount(parts).tolist() == [8000, 1000, 1000]
-
-
-def test_drawn_bodies_make_pairs_of_their_own():
-    pairs = pair_ids([-1, -1, 3, 4, 3], [-1, -1, 4, 3, -1])
-    assert pairs[2] == pairs[3]
-    assert len(set(pairs.tolist())) == 4
-
-
-def test_fewer_pairs_than_folds_are_refused():
-    with pytest.raises(InputError, match="2 different pairs"):
-        pair_folds(np.array([0, 0, 1]), 5, np.random.default_rng(0))
-    with pytest.raises(InputError, match="n_folds is 1"):
-        pair_folds(np.arange(9), 1, np.random.default_rng(0))
 
 
 @settings(max_examples=25)
@@ -75,24 +32,21 @@ def test_no_augmented_or_duplicated_row_reaches_a_validation_fold(ends, seed, ba
     X = X[pairs]
     y = rng.random(len(dep)) < 0.25
     y[:4] = True, True, True, False
-    folds = pair_folds(pairs, 5, rng)
-    seen = []
+    folds = split_pairs(pairs, [0.2] * 5, rng)
     for fold in range(5):
-        if y[folds != fold].sum() < 2:
+        inside, outside = X[folds == fold], folds != fold
+        if y[outside].sum() < 2:
             return
-    for fold in training_folds(X, y, folds, rng, balance=balance):
-        a = len(fold.train_rows)
-        assert np.array_equal(fold.X[:a], X[fold.train_rows])
-        assert np.array_equal(fold.y[:a], y[fold.train_rows])
-        assert balance or len(fold.X) == a
-        rows = {row.tobytes() for row in fold.X}
-        assert not rows & {row.tobytes() for row in X[fold.validation_rows]}
-        assert not set(fold.train_rows) & set(fold.validation_rows)
+        X_train, y_train = X[outside], y[outside]
+        filled, labels = adasyn(X_train, y_train, rng) if balance else (X_train, y_train)
+        a = len(X_train)
+        assert np.array_equal(filled[:a], X_train)
+        assert np.array_equal(labels[:a], y_train)
+        rows = {row.tobytes() for row in filled}
+        assert not rows & {row.tobytes() for row in inside}
         # Synthetic rows lie between training rows: they span no new ground.
-        assert (fold.X.min(axis=0) >= X[fold.train_rows].min(axis=0) - 1e-12).all()
-        assert (fold.X.max(axis=0) <= X[fold.train_rows].max(axis=0) + 1e-12).all()
-        seen.extend(fold.validation_rows)
-    assert sorted(seen) == list(range(len(X)))
+        assert (filled.min(axis=0) >= X_train.min(axis=0) - 1e-12).all()
+        assert (filled.max(axis=0) <= X_train.max(axis=0) + 1e-12).all()
 
 
 def imbalanced(n=400, share=0.1):

@@ -5,9 +5,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from feasibility.constants import DAY_S
 from feasibility.errors import InputError
+from feasibility.orbits import synthetic_main_belt
 from feasibility.orbits.kepler_kernels import propagate_batch
-from feasibility.orbits.lambert import lambert
+from feasibility.orbits.lambert import lambert, lambert_delta_v
 from feasibility.runtime.pykep_guard import load_pykep
 
 EPS = np.finfo(float).eps
@@ -106,3 +108,29 @@ def test_exactly_0_and_180_degrees_have_no_branch():
 def test_wrong_shapes_are_input_errors(r1, tof, revs):
     with pytest.raises(InputError):
         lambert(r1, [[0, 1.0, 0]], tof, revs)
+
+
+def test_the_velocity_change_of_a_coasting_leg_is_zero():
+    belt = synthetic_main_belt(5, np.random.default_rng(3))
+    # Half a period lies in every plane; a third does not.
+    later = belt.states_at(np.arange(5), 8000.0 + belt.period_days / 3)
+    cost = lambert_delta_v(belt.states(8000.0), later, belt.period_days / 3 * DAY_S)
+    assert cost.shape == (5,)
+    assert cost.max() < 1e-5
+
+
+def test_the_velocity_change_is_the_least_sum_of_both_impulses_and_infinite_without_a_branch():
+    rv_dep = np.array([[1, 0, 0, 0, 1, 0.1], [1, 0, 0, 0, 1, 0]])
+    rv_arr = np.array([[0, 2, 0.1, -0.7, 0, 0], [-2, 0, 0, 0, -0.7, 0]])
+    v1, v2 = lambert(rv_dep[:, :3], rv_arr[:, :3], [40.0, 40.0], 2, mu=1.0)
+    sums = np.linalg.norm(v1[0] - rv_dep[0, 3:], axis=1)
+    sums += np.linalg.norm(v2[0] - rv_arr[0, 3:], axis=1)
+    assert np.isfinite(sums).all()
+    assert lambert_delta_v(rv_dep, rv_arr, 40.0, mu=1.0).tolist() == [sums.min(), np.inf]
+
+
+def test_states_of_another_shape_are_input_errors():
+    with pytest.raises(InputError, match=r"rv_dep: expected shape \(n, 6\), got \(1, 3\)"):
+        lambert_delta_v([[1.0, 0, 0]], [[0, 1.0, 0, 0, 0, 0]], 1.0)
+    with pytest.raises(InputError, match="same number of rows"):
+        lambert_delta_v(np.ones((2, 6)), np.ones((1, 6)), 1.0)

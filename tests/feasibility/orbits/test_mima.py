@@ -5,15 +5,14 @@ import pytest
 
 from feasibility.constants import AU, DAY_S, MU_SUN
 from feasibility.errors import InputError
-from feasibility.orbits.lambert import lambert
+from feasibility.orbits.lambert import lambert, lambert_delta_v
 from feasibility.orbits.mima import (
-    lambert_delta_v,
     mima,
     mima2,
     mima2_branches,
     mima_branches,
 )
-from feasibility.pruners.check import _varied_legs
+from feasibility.orbits.varied_legs import varied_legs
 from feasibility.runtime.pykep_guard import load_pykep
 
 THRUST, EXHAUST = 0.3, 30000.0
@@ -24,7 +23,7 @@ def _both(max_revs=2):
     pk = load_pykep()
     rows = []
     for seed in range(4):
-        legs = _varied_legs(np.random.default_rng(seed))
+        legs = varied_legs(np.random.default_rng(seed))
         v1, v2 = lambert(legs.rv_dep[:, :3], legs.rv_arr[:, :3], legs.tof_s, max_revs)
         first = mima_branches(legs.rv_dep, legs.rv_arr, legs.tof_s, THRUST, EXHAUST, max_revs)
         second = mima2_branches(legs.rv_dep, legs.rv_arr, legs.tof_s, THRUST, EXHAUST, max_revs)
@@ -67,7 +66,7 @@ def test_mima2_equals_pykep_to_1e_10_where_the_switching_time_is_unique(both):
 
 
 def test_best_branch_is_the_largest_and_a_missing_one_counts_as_zero():
-    legs = _varied_legs(np.random.default_rng(9))
+    legs = varied_legs(np.random.default_rng(9))
     arguments = (legs.rv_dep, legs.rv_arr, legs.tof_s, legs.thrust, legs.exhaust_velocity)
     for best, branches in ((mima, mima_branches), (mima2, mima2_branches)):
         np.testing.assert_array_equal(best(*arguments), np.nanmax(branches(*arguments), axis=1))
@@ -79,7 +78,7 @@ def test_best_branch_is_the_largest_and_a_missing_one_counts_as_zero():
 
 
 def test_mass_is_proportional_to_thrust_at_given_exhaust_velocity():
-    legs = _varied_legs(np.random.default_rng(9))
+    legs = varied_legs(np.random.default_rng(9))
     single = mima2(legs.rv_dep, legs.rv_arr, legs.tof_s, 0.2, 3e4)
     double = mima2(legs.rv_dep, legs.rv_arr, legs.tof_s, 0.4, 3e4)
     np.testing.assert_allclose(double, 2 * single, rtol=1e-14)

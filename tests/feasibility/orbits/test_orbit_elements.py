@@ -16,7 +16,7 @@ from feasibility.orbits import (
     equinoctial_to_cartesian,
     equinoctial_to_classical,
 )
-from feasibility.orbits.elements import mean_to_eccentric
+from feasibility.orbits.classical import mean_to_eccentric
 from feasibility.runtime.pykep_guard import load_pykep
 
 # The first example pays for importing pykep or loading a compiled kernel.

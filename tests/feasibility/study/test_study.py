@@ -19,7 +19,7 @@ from feasibility import InputError
 from feasibility.classifier.paper.features import FEATURES
 from feasibility.commands.cli import main
 from feasibility.dataset import Dataset
-from feasibility.dataset.folds import pair_ids
+from feasibility.dataset.splits import pair_ids
 from feasibility.study import (
     EXPERIMENTS,
     fit,

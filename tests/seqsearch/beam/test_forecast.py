@@ -7,8 +7,6 @@ from hypothesis import strategies as st
 
 from feasibility import AllOf, KeepAll, Legs
 from feasibility.classifier.predictor import (
-    LambertPropellant,
-    LegPredictor,
     QuickPredictor,
     bounded_final_mass,
     lambert_final_mass,
@@ -196,4 +194,3 @@ def test_final_masses_lie_between_impulses_and_full_thrust():
     burnt = legs.thrust * legs.tof_s / legs.exhaust_velocity
     assert np.all(masses >= legs.m0 - burnt - 1e-9)
     assert masses[2] > masses[1]
-    assert isinstance(LambertPropellant(Toy()), LegPredictor)

@@ -53,10 +53,10 @@ def test_a_far_stratum_is_a_tripwire():
     without = AuditEstimate.of([RankAudit(pruned=(near,), kept=(kept,))])
     calm = AuditEstimate.of([RankAudit(pruned=(near, quiet), kept=(kept,))])
     assert calm.interval == without.interval
-    assert calm.interval_no_trust[1] > 2 * calm.interval[1]
+    assert calm.interval_unconditional[1] > 2 * calm.interval[1]
     tripped = replace(quiet, flyable=1)
     alarm = AuditEstimate.of([RankAudit(pruned=(near, tripped), kept=(kept,))])
-    assert alarm.interval == alarm.interval_no_trust
+    assert alarm.interval == alarm.interval_unconditional
     assert alarm.false_prune_rate > 10 * calm.false_prune_rate
     assert alarm.far_found == 1
 

@@ -12,7 +12,7 @@ from feasibility import InputError
 from seqsearch import read_tour
 from seqsearch.commands.cli import main
 from seqsearch.problems.problem_file import build_problem, read_config
-from seqsearch.runs.fleet import check_disjoint, read_fleet
+from seqsearch.runs.fleet import check_disjoint, probe_paths
 from tests.helpers.problem_texts import QUICK
 
 PROBLEM = QUICK.replace("synthetic_bodies = 300", "synthetic_bodies = 1500")
@@ -30,7 +30,7 @@ def fleet(tmp_path_factory):
 
 
 def test_probes_of_a_fleet_share_no_asteroid(fleet, capsys):
-    tours = read_fleet(fleet)
+    tours = [read_tour(path) for path in probe_paths(fleet)]
     assert len(tours) == 2
     assert all(tour.legs for tour in tours)
     bodies = [{body.id for body in tour.bodies} for tour in tours]
@@ -52,7 +52,7 @@ def test_a_shared_asteroid_fails_the_verification(fleet, tmp_path, capsys):
     copy = tmp_path / "copy"
     shutil.copytree(fleet, copy)
     shutil.copy(copy / "probe-1" / "sequence.json", copy / "probe-2" / "sequence.json")
-    assert not check_disjoint(read_fleet(copy)).passed
+    assert not check_disjoint([read_tour(path) for path in probe_paths(copy)]).passed
     assert main(["verify", str(copy)]) == 1
     assert "NOT verified" in capsys.readouterr().out
 

@@ -1,5 +1,6 @@
 """`Model`: what the five classifiers have in common."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar, Protocol, Self, final
@@ -29,18 +30,13 @@ class Epoch:
     seconds: float
 
 
-@final
-class StopTraining(Exception):  # noqa: N818 (a request, not an error)
-    """Raised by `on_epoch` to end training; the model keeps what it has learned."""
-
-
 OnEpoch = Callable[[Epoch], None]
 
 
 class Model(Protocol):
     """A classifier of legs; with n the number of legs and k of features.
 
-    Prediction is computed from `to_arrays` by `inference`, in training as in a
+    Prediction is computed from `to_arrays` by `classifier.paper.predictors`, in training as in a
     search, so that the two cannot differ.
     """
 
@@ -83,11 +79,11 @@ class Model(Protocol):
         ...
 
     def to_arrays(self) -> dict[str, NDArray[Any]]:
-        """Return all that prediction needs, see `inference`."""
+        """Return all that prediction needs, see `classifier.paper.predictors`."""
         ...
 
 
-class Fitted:
+class Fitted(ABC):
     """Arrays of a fitted model, and prediction from them; the models share it."""
 
     kind: ClassVar[str]
@@ -95,6 +91,11 @@ class Fitted:
     def __init__(self) -> None:
         self._arrays: dict[str, NDArray[Any]] | None = None
         self._predictor: Predictor | None = None
+
+    @property
+    @abstractmethod
+    def config(self) -> dict[str, Any]:
+        """Hyperparameters, as JSON has them."""
 
     def predict_probability(self, X: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return (n,) the probability that a leg is feasible, for standardised features (n, k)."""
@@ -127,16 +128,3 @@ def check_training_data(X: NDArray[np.float64], y: NDArray[np.bool_]) -> None:
         raise InputError("training data: a feature is not finite")
     if y.all() or not y.any():
         raise InputError("training data: only one class is there")
-
-
-def subset(
-    X: NDArray[np.float64],
-    y: NDArray[np.bool_],
-    max_samples: int | None,
-    rng: np.random.Generator,
-) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Return at most `max_samples` rows, drawn at random and kept in order."""
-    if max_samples is None or len(y) <= max_samples:
-        return X, y
-    rows = np.sort(rng.choice(len(y), max_samples, replace=False))
-    return X[rows], y[rows]

@@ -15,16 +15,23 @@ from feasibility.learning.paper.models.base import (
     Epoch,
     Fitted,
     OnEpoch,
-    StopTraining,
     check_training_data,
 )
-from feasibility.learning.paper.models.dnn_checkpoint import TrainingState, training_identity
 from feasibility.learning.paper.models.precision import PRECISIONS, resolve_precision
+from feasibility.learning.training_loop import (
+    Checkpoint,
+    Learner,
+    LoopRule,
+    train_network,
+    training_identity,
+)
 from feasibility.runtime.extras import load_extra
 
 ACTIVATIONS: Final = ("relu", "leaky_relu", "elu")
 _ADAM_EPSILON: Final = 1e-8
 _VALIDATION_BATCH: Final = 8192
+_NOT_OF_THE_TRAINING: Final = ("epochs", "patience", "device", "threads", "precision")
+"""Hyperparameters that may change between an interrupted training and its continuation."""
 
 
 @final
@@ -47,13 +54,13 @@ class DnnConfig:
     learning_rate : float
         At the first epoch.
     drop_period : int
-        T_drop: the rate falls every so many epochs ...
+        T_drop: the rate falls each time this many epochs have passed ...
     drop_factor : float
         ... by this factor, d.
     epochs : int
         How many at most; by default the rate has then fallen three times for DNN1.
     patience : int, optional
-        Stop early, when the validation loss has not fallen for so many epochs.
+        Stop early, when the validation loss has not fallen for this many epochs.
     keep_best : bool
         Keep the weights of the lowest validation loss instead of the last ones. With neither,
         as in the paper, validation rows are only reported on.
@@ -161,14 +168,6 @@ class Dnn(Fitted):
         torch.set_num_threads(config.threads)
         seed = int(rng.integers(2**31))
 
-        inputs = torch.as_tensor(X, dtype=torch.float32, device=device)
-        labels = torch.as_tensor(y, dtype=torch.int64, device=device)
-        validation = None
-        if X_val is not None and y_val is not None and len(y_val):
-            validation = (
-                torch.as_tensor(X_val, dtype=torch.float32, device=device),
-                torch.as_tensor(y_val, dtype=torch.int64, device=device),
-            )
         network = _network(torch, config, X.shape[1], seed).to(device)
         optimiser = torch.optim.Adam(
             network.parameters(),
@@ -177,62 +176,96 @@ class Dnn(Fitted):
             eps=_ADAM_EPSILON,
             fused=True,
         )
-        cross_entropy = torch.nn.functional.cross_entropy
-        rounded = torch.autocast(
-            device, dtype=torch.bfloat16, enabled=config.precision == "bfloat16"
+        validation = None
+        if X_val is not None and y_val is not None and len(y_val):
+            validation = _tensors(torch, X_val, y_val, device)
+        epochs = _Epochs(
+            config, network, optimiser, _tensors(torch, X, y, device), validation, seed, device
         )
-        state = TrainingState(network, optimiser, training_identity(self.config, X, y, seed))
-        if checkpoint is not None and checkpoint.exists():
-            state.load(torch, checkpoint)
-
-        n = len(labels)
-        # A last batch of a few rows would make a wild step: it is shared among the others.
-        n_batches = max(1, round(n / config.batch))
-        for number in range(state.epoch + 1, config.epochs + 1):
-            if config.patience is not None and number - 1 - state.best_epoch >= config.patience:
-                break
-            began = time.perf_counter()
-            for group in optimiser.param_groups:
-                group["lr"] = config.rate(number)
-            # Seeded by the epoch, so that a resumed training shuffles as an uninterrupted one.
-            shuffle = torch.Generator().manual_seed((seed + 7919 * number) % 2**31)
-            order = torch.randperm(n, generator=shuffle).to(device)
-            total_loss = torch.zeros((), device=device)
-            right = torch.zeros((), device=device)
-            network.train()
-            for rows in torch.tensor_split(order, n_batches):
-                with rounded:
-                    logits = network(inputs[rows])
-                    loss = cross_entropy(logits, labels[rows])
-                optimiser.zero_grad(set_to_none=True)
-                loss.backward()
-                optimiser.step()
-                total_loss += loss.detach() * len(rows)
-                right += (logits.detach().argmax(dim=1) == labels[rows]).sum()
-
-            with rounded:
-                val_loss, val_accuracy = _validate(torch, network, validation)
-            epoch = Epoch(
-                number,
-                config.rate(number),
-                float(total_loss) / n,
-                float(right) / n,
-                val_loss,
-                val_accuracy,
-                time.perf_counter() - began,
-            )
-            state.record(epoch, keep_best=config.keep_best)
-            if checkpoint is not None:
-                state.save(torch, checkpoint)
-            if on_epoch is not None:
-                try:
-                    on_epoch(epoch)
-                except StopTraining:
-                    break
-        network.load_state_dict(state.best_weights)
-        self._history = tuple(state.history)
+        self._history = train_network(
+            Learner(network, optimiser, epochs.train, Epoch),
+            LoopRule(config.epochs, config.patience, config.keep_best),
+            checkpoint=Checkpoint.at(checkpoint, lambda: _identity(config, X, y, seed)),
+            on_epoch=on_epoch or (lambda _: None),
+        )
         self._keep(_arrays(network, config))
         return self
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class _Epochs:
+    """What an epoch of a network is; n training rows."""
+
+    config: DnnConfig
+    network: Any
+    optimiser: Any
+    rows: tuple[Any, Any]
+    validation: tuple[Any, Any] | None
+    seed: int
+    device: str
+
+    def train(self, number: int) -> Epoch:
+        """Train for one epoch and return its record."""
+        torch, config = load_extra("torch"), self.config
+        began = time.perf_counter()
+        for group in self.optimiser.param_groups:
+            group["lr"] = config.rate(number)
+        rounded = torch.autocast(
+            self.device, dtype=torch.bfloat16, enabled=config.precision == "bfloat16"
+        )
+        n = len(self.rows[1])
+        loss, right = self._learn(torch, number, rounded)
+        with rounded:
+            val_loss, val_accuracy = _validate(torch, self.network, self.validation)
+        return Epoch(
+            number,
+            config.rate(number),
+            loss / n,
+            right / n,
+            val_loss,
+            val_accuracy,
+            time.perf_counter() - began,
+        )
+
+    def _learn(self, torch: Any, number: int, rounded: Any) -> tuple[float, float]:
+        """Take the steps of one epoch; return the sums of losses and of right answers."""
+        inputs, labels = self.rows
+        n = len(labels)
+        # Seeded by the epoch, so that a resumed training shuffles as an uninterrupted one.
+        shuffle = torch.Generator().manual_seed((self.seed + 7919 * number) % 2**31)
+        order = torch.randperm(n, generator=shuffle).to(self.device)
+        total_loss = torch.zeros((), device=self.device)
+        right = torch.zeros((), device=self.device)
+        self.network.train()
+        # A last batch of a few rows would make a wild step: it is shared among the others.
+        for rows in torch.tensor_split(order, max(1, round(n / self.config.batch))):
+            with rounded:
+                logits = self.network(inputs[rows])
+                loss = torch.nn.functional.cross_entropy(logits, labels[rows])
+            self.optimiser.zero_grad(set_to_none=True)
+            loss.backward()
+            self.optimiser.step()
+            total_loss += loss.detach() * len(rows)
+            right += (logits.detach().argmax(dim=1) == labels[rows]).sum()
+        return float(total_loss), float(right)
+
+
+def _tensors(
+    torch: Any, X: NDArray[np.float64], y: NDArray[np.bool_], device: str
+) -> tuple[Any, Any]:
+    return (
+        torch.as_tensor(X, dtype=torch.float32, device=device),
+        torch.as_tensor(y, dtype=torch.int64, device=device),
+    )
+
+
+def _identity(config: DnnConfig, X: NDArray[np.float64], y: NDArray[np.bool_], seed: int) -> str:
+    """Return the identity of a training, which may last longer or go on elsewhere."""
+    settings = {
+        name: value for name, value in asdict(config).items() if name not in _NOT_OF_THE_TRAINING
+    }
+    return training_identity({**settings, "seed": seed}, X, y)
 
 
 def _network(torch: Any, config: DnnConfig, n_features: int, seed: int) -> Any:

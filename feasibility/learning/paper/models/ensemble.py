@@ -9,13 +9,13 @@ kilobytes instead of tens of megabytes.
 """
 
 from dataclasses import asdict, dataclass
-from typing import Any, Self, final
+from typing import Any, final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.errors import MissingDependencyError
-from feasibility.learning.paper.models.base import Fitted, OnEpoch, check_training_data, subset
+from feasibility.learning.paper.models.baseline import Baseline
 from feasibility.runtime.extras import load_extra
 
 
@@ -38,34 +38,18 @@ class EnsembleConfig:
 
 
 @final
-class Ensemble(Fitted):
+class Ensemble(Baseline[EnsembleConfig]):
     """scikit-learn's histogram-based gradient boosting."""
 
     kind = "ensemble"
 
     def __init__(self, **hyperparameters: Any) -> None:
-        super().__init__()
-        self._config = EnsembleConfig(**hyperparameters)
+        super().__init__(EnsembleConfig(**hyperparameters))
 
-    @property
-    def config(self) -> dict[str, Any]:
-        """Hyperparameters."""
-        return asdict(self._config)
-
-    def fit(
-        self,
-        X: NDArray[np.float64],
-        y: NDArray[np.bool_],
-        *,
-        rng: np.random.Generator,
-        X_val: NDArray[np.float64] | None = None,  # noqa: ARG002
-        y_val: NDArray[np.bool_] | None = None,  # noqa: ARG002
-        on_epoch: OnEpoch | None = None,  # noqa: ARG002
-    ) -> Self:
-        """Learn; see `Model.fit`."""
-        check_training_data(X, y)
-        X, y = subset(X, y, self._config.max_samples, rng)
-        options = self.config
+    def _fit(
+        self, X: NDArray[np.float64], y: NDArray[np.bool_], rng: np.random.Generator
+    ) -> dict[str, NDArray[Any]]:
+        options = asdict(self._config)
         del options["max_samples"], options["threads"]
         estimator = load_extra("sklearn.ensemble").HistGradientBoostingClassifier(
             early_stopping=False, random_state=int(rng.integers(2**31)), **options
@@ -73,8 +57,7 @@ class Ensemble(Fitted):
         with load_extra("threadpoolctl").threadpool_limits(self._config.threads):
             # Single precision, as prediction sees the features.
             estimator.fit(X.astype(np.float32), y)
-        self._keep(_node_arrays(estimator))
-        return self
+        return _node_arrays(estimator)
 
 
 def _node_arrays(estimator: Any) -> dict[str, NDArray[Any]]:

@@ -1,13 +1,13 @@
 """K nearest neighbours."""
 
-from dataclasses import asdict, dataclass
-from typing import Any, Self, final
+from dataclasses import dataclass
+from typing import Any, final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.errors import InputError
-from feasibility.learning.paper.models.base import Fitted, OnEpoch, check_training_data, subset
+from feasibility.learning.paper.models.baseline import Baseline
 
 
 @final
@@ -31,7 +31,7 @@ class KnnConfig:
 
 
 @final
-class Knn(Fitted):
+class Knn(Baseline[KnnConfig]):
     """Vote of the nearest training rows, Euclidean on standardised features.
 
     There is nothing to fit but the rows kept; scikit-learn's
@@ -41,33 +41,17 @@ class Knn(Fitted):
     kind = "knn"
 
     def __init__(self, **hyperparameters: Any) -> None:
-        super().__init__()
-        self._config = KnnConfig(**hyperparameters)
+        super().__init__(KnnConfig(**hyperparameters))
 
-    @property
-    def config(self) -> dict[str, Any]:
-        """Hyperparameters."""
-        return asdict(self._config)
-
-    def fit(
+    def _fit(
         self,
         X: NDArray[np.float64],
         y: NDArray[np.bool_],
-        *,
-        rng: np.random.Generator,
-        X_val: NDArray[np.float64] | None = None,  # noqa: ARG002
-        y_val: NDArray[np.bool_] | None = None,  # noqa: ARG002
-        on_epoch: OnEpoch | None = None,  # noqa: ARG002
-    ) -> Self:
-        """Learn; see `Model.fit`."""
-        check_training_data(X, y)
-        X, y = subset(X, y, self._config.max_samples, rng)
-        self._keep(
-            {
-                "rows": X.astype(np.float64),
-                "label": y.astype(np.uint8),
-                "neighbours": np.array(min(self._config.neighbours, len(y))),
-                "weighting": np.array(self._config.weighting),
-            }
-        )
-        return self
+        rng: np.random.Generator,  # noqa: ARG002
+    ) -> dict[str, NDArray[Any]]:
+        return {
+            "rows": X.astype(np.float64),
+            "label": y.astype(np.uint8),
+            "neighbours": np.array(min(self._config.neighbours, len(y))),
+            "weighting": np.array(self._config.weighting),
+        }

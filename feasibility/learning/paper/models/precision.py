@@ -3,7 +3,7 @@
 In bfloat16 (torch's automatic mixed precision) the matrix products are rounded
 to 8 binary digits, while weights, their updates, the sums inside a product and
 the loss stay in float32. Processors with AMX tiles and GPUs multiply such
-matrices many times faster. Prediction is always float32 (`inference`).
+matrices many times faster. Prediction is always float32 (`classifier.paper.predictors`).
 """
 
 from typing import Any, Final

@@ -1,13 +1,13 @@
 """Support vector machine with a Gaussian kernel."""
 
-from dataclasses import asdict, dataclass
-from typing import Any, Final, Self, final
+from dataclasses import dataclass
+from typing import Any, Final, final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.classifier.paper.predictors import VectorsPredictor
-from feasibility.learning.paper.models.base import Fitted, OnEpoch, check_training_data, subset
+from feasibility.learning.paper.models.baseline import Baseline
 from feasibility.runtime.extras import load_extra
 
 _SHARE_FOR_SIGMOID: Final = 0.1
@@ -29,7 +29,7 @@ class SvmConfig:
 
 
 @final
-class Svm(Fitted):
+class Svm(Baseline[SvmConfig]):
     """scikit-learn's SVC, its decision value made a probability by Platt's sigmoid.
 
     The sigmoid is fitted on a tenth of the training rows that the machine has
@@ -39,28 +39,12 @@ class Svm(Fitted):
     kind = "svm"
 
     def __init__(self, **hyperparameters: Any) -> None:
-        super().__init__()
-        self._config = SvmConfig(**hyperparameters)
+        super().__init__(SvmConfig(**hyperparameters))
 
-    @property
-    def config(self) -> dict[str, Any]:
-        """Hyperparameters."""
-        return asdict(self._config)
-
-    def fit(
-        self,
-        X: NDArray[np.float64],
-        y: NDArray[np.bool_],
-        *,
-        rng: np.random.Generator,
-        X_val: NDArray[np.float64] | None = None,  # noqa: ARG002
-        y_val: NDArray[np.bool_] | None = None,  # noqa: ARG002
-        on_epoch: OnEpoch | None = None,  # noqa: ARG002
-    ) -> Self:
-        """Learn; see `Model.fit`."""
-        check_training_data(X, y)
-        X, y = subset(X, y, self._config.max_samples, rng)
-        held, seen = _held_out(y, rng)
+    def _fit(
+        self, X: NDArray[np.float64], y: NDArray[np.bool_], rng: np.random.Generator
+    ) -> dict[str, NDArray[Any]]:
+        sigmoid_rows, seen = _held_out(y, rng)
         gamma = 1.0 / X.shape[1] if self._config.gamma is None else self._config.gamma
         machine = load_extra("sklearn.svm").SVC(C=self._config.C, gamma=gamma, cache_size=500)
         machine.fit(X[seen], y[seen])
@@ -71,24 +55,23 @@ class Svm(Fitted):
             "gamma": np.array(gamma),
             "sigmoid": np.array([1.0, 0.0]),
         }
-        decision = VectorsPredictor(arrays).decide(X[held])
+        decision = VectorsPredictor(arrays).decide(X[sigmoid_rows])
         sigmoid = load_extra("sklearn.linear_model").LogisticRegression(C=1e3)
-        sigmoid.fit(decision[:, None], y[held])
+        sigmoid.fit(decision[:, None], y[sigmoid_rows])
         arrays["sigmoid"] = np.array([sigmoid.coef_[0, 0], sigmoid.intercept_[0]])
-        self._keep(arrays)
-        return self
+        return arrays
 
 
 def _held_out(
     y: NDArray[np.bool_], rng: np.random.Generator
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Return rows for the sigmoid, at least one of each class, and the others."""
-    held = []
+    by_class = []
     for rows in (np.flatnonzero(y), np.flatnonzero(~y)):
         size = max(1, round(_SHARE_FOR_SIGMOID * len(rows)))
-        held.append(rng.choice(rows, size, replace=False))
-    chosen = np.sort(np.concatenate(held))
+        by_class.append(rng.choice(rows, size, replace=False))
+    chosen = np.sort(np.concatenate(by_class))
     # A class with a single row needs it in both places.
-    single = [rows for rows in held if np.sum(y == y[rows[0]]) == 1]
+    single = [rows for rows in by_class if np.sum(y == y[rows[0]]) == 1]
     seen = np.setdiff1d(np.arange(len(y)), chosen)
     return chosen, np.sort(np.concatenate([seen, *single])).astype(np.int64)

@@ -1,12 +1,12 @@
 """A single decision tree."""
 
-from dataclasses import asdict, dataclass
-from typing import Any, Self, final
+from dataclasses import dataclass
+from typing import Any, final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.learning.paper.models.base import Fitted, OnEpoch, check_training_data, subset
+from feasibility.learning.paper.models.baseline import Baseline
 from feasibility.runtime.extras import load_extra
 
 
@@ -26,33 +26,17 @@ class TreeConfig:
 
 
 @final
-class Tree(Fitted):
+class Tree(Baseline[TreeConfig]):
     """scikit-learn's decision tree."""
 
     kind = "tree"
 
     def __init__(self, **hyperparameters: Any) -> None:
-        super().__init__()
-        self._config = TreeConfig(**hyperparameters)
+        super().__init__(TreeConfig(**hyperparameters))
 
-    @property
-    def config(self) -> dict[str, Any]:
-        """Hyperparameters."""
-        return asdict(self._config)
-
-    def fit(
-        self,
-        X: NDArray[np.float64],
-        y: NDArray[np.bool_],
-        *,
-        rng: np.random.Generator,
-        X_val: NDArray[np.float64] | None = None,  # noqa: ARG002
-        y_val: NDArray[np.bool_] | None = None,  # noqa: ARG002
-        on_epoch: OnEpoch | None = None,  # noqa: ARG002
-    ) -> Self:
-        """Learn; see `Model.fit`."""
-        check_training_data(X, y)
-        X, y = subset(X, y, self._config.max_samples, rng)
+    def _fit(
+        self, X: NDArray[np.float64], y: NDArray[np.bool_], rng: np.random.Generator
+    ) -> dict[str, NDArray[Any]]:
         estimator = load_extra("sklearn.tree").DecisionTreeClassifier(
             criterion=self._config.criterion,
             min_samples_leaf=self._config.min_samples_leaf,
@@ -62,15 +46,12 @@ class Tree(Fitted):
         tree = estimator.fit(X, y).tree_
         # The two classes' shares of a node's samples; the second is "feasible".
         shares = tree.value[:, 0, :] / tree.value[:, 0, :].sum(axis=1, keepdims=True)
-        self._keep(
-            {
-                "feature": np.maximum(tree.feature, 0).astype(np.int32),
-                "threshold": tree.threshold.astype(np.float64),
-                "left": tree.children_left.astype(np.int32),
-                "right": tree.children_right.astype(np.int32),
-                "value": shares[:, 1].astype(np.float64),
-                "root": np.zeros(1, dtype=np.int32),
-                "base": np.array(0.0),
-            }
-        )
-        return self
+        return {
+            "feature": np.maximum(tree.feature, 0).astype(np.int32),
+            "threshold": tree.threshold.astype(np.float64),
+            "left": tree.children_left.astype(np.int32),
+            "right": tree.children_right.astype(np.int32),
+            "value": shares[:, 1].astype(np.float64),
+            "root": np.zeros(1, dtype=np.int32),
+            "base": np.array(0.0),
+        }

@@ -1,0 +1,69 @@
+"""What a problem asks of a given tour, without trusting the tour's own file."""
+
+import msgspec
+import numpy as np
+
+from feasibility.orbits import Catalogue
+from seqsearch.problems.problem_file import Config, build_problem
+from seqsearch.tours.records import TourBody
+from seqsearch.tours.tour import Tour, TourRules
+
+
+def rules_of(config: Config, tour: Tour, catalogue: Catalogue | None = None) -> TourRules:
+    """Return the rules of a problem file for the verification of a tour.
+
+    Parameters
+    ----------
+    config : Config
+        The problem file.
+    tour : Tour
+        The tour. Where there is no table its bodies stand in for one.
+    catalogue : Catalogue, optional
+        The asteroid table.
+
+    Raises
+    ------
+    InputError
+        A value of the problem file is out of range, or its rules need the table.
+    """
+    if catalogue is None:
+        catalogue = _bodies_of(tour, config.mission.start_ids)
+        # Which bodies were excluded plays no part in the rules.
+        table = msgspec.structs.replace(config.catalogue, exclude_ids=())
+        config = msgspec.structs.replace(config, catalogue=table)
+    return build_problem(config, catalogue).tour_rules()
+
+
+def differences(found: TourRules, expected: TourRules) -> list[str]:
+    """Return the rules in which two records differ, in words; the catalogue's path aside."""
+    names = [field.name for field in msgspec.structs.fields(TourRules)]
+    return [
+        f"{name} {_short(getattr(found, name))} instead of {_short(getattr(expected, name))}"
+        for name in names
+        if name not in ("name", "catalogue") and getattr(found, name) != getattr(expected, name)
+    ]
+
+
+def _short(value: object) -> str:
+    text = str(value)
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def _bodies_of(tour: Tour, start_ids: tuple[int, ...]) -> Catalogue:
+    """Return the visited bodies as a catalogue; the first stands in for missing start bodies."""
+    bodies = {body.id: body for body in tour.visits or tour.bodies}
+    first = next(iter(bodies.values()))
+    for body_id in (*start_ids, max(bodies) + 1):
+        bodies.setdefault(body_id, first)
+    return Catalogue(
+        ids=list(bodies),
+        names=[body.name for body in bodies.values()],
+        epoch_mjd2000=[body.epoch_mjd2000 for body in bodies.values()],
+        elements=[_elements(body) for body in bodies.values()],
+        source=tour.rules.catalogue,
+    )
+
+
+def _elements(body: TourBody) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+    angles = [body.i_rad, body.node_rad, body.argp_rad, body.mean_anomaly_rad]
+    return np.array([body.a_m, body.e, *angles])
