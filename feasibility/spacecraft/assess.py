@@ -73,7 +73,7 @@ class Assessment:
     legs, unsolved : int
         Legs judged, and those whose m* the solver did not find.
     balanced_accuracy : float
-        Mean of the shares of feasible and of infeasible legs that are told rightly at
+        Mean of the shares of feasible and of infeasible legs that are judged rightly at
         probability 0.5, among legs that were not drawn near the boundary.
     balanced_interval : pair of float
         Mean of the ends of both shares' intervals.
