@@ -59,7 +59,7 @@ class Gtoc5Forecast:
     points : (n, 5) float64, m/s
         The bodies in the space of the elements, see `phase_free_points`.
     predictor : LegPredictor
-        Whom to ask; a `QuickPredictor` for its quick answers first.
+        Predicts the legs; a `QuickPredictor` gives its quick answers first.
     settings : SearchSettings
         `neighbours`: bodies looked at, the nearest in the space of the elements;
         `tof_days_min` and `tof_days_max`, of transfers alone.

@@ -141,7 +141,7 @@ def test_bad_pruner_specifications_are_refused(spec):
 
 
 def test_the_page_on_problems_names_every_key_and_its_example_can_be_read(tmp_path):
-    page = (Path(__file__).parents[3] / "docs" / "problems.md").read_text()
+    page = (Path(__file__).parents[3] / "docs" / "guide" / "problems.md").read_text()
     tables = {
         "problem": ProblemTable,
         "spacecraft": SpacecraftTable,
