@@ -126,7 +126,7 @@ def burns_nearly_everything(legs: Legs, solutions: LegSolutions) -> NDArray[np.b
     """Tell where an impulse of the backward half exceeds the exhaust velocity.
 
     Such an impulse leaves less than 1/e of the mass. pykep's convention allows it, with the
-    thrust over the mass that is left (docs/solver.md); the fast solver does not look there.
+    thrust over the mass that is left (docs/guide/solver.md); the fast solver does not look there.
     """
     n = solutions.n_segments
     mass = solutions.m_final.copy()

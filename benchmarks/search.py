@@ -62,7 +62,7 @@ class Row:
     steps: list[tuple[int, int]]
 
     def optimised_until(self, asteroids: int) -> int | None:
-        """Return the legs optimised until there were so many asteroids; None if never."""
+        """Return the legs optimised until there were that many asteroids; None if never."""
         return next((solves for solves, reached in self.steps if reached >= asteroids), None)
 
 

@@ -88,7 +88,7 @@ class Budget:
         self.solves += solves
 
     def affordable(self, solves: int) -> int:
-        """Return how many of so many solves are left."""
+        """Return how many of the wanted solves are left."""
         return solves if self._max_solves is None else min(solves, self._max_solves - self.solves)
 
     def used_up(self) -> bool:

@@ -9,11 +9,11 @@ interrupted, and --share makes a smaller model of the same kind:
 1. Legs with m* of all families: `FAMILIES`; the margin nets learn from them.
 2. With --hard-rounds N, N times: legs that the last model is most unsure of among several
    times as many (`HARD`), and a training with them too. Not part of the default model, as
-   docs/classifier.md says why.
+   docs/guide/classifier.md says why.
 3. Legs with minimum propellant: `PROPELLANT`; the net for the final mass learns from them.
 
-The families are those of docs/classifier.md. Seeds of training and test differ, and test legs
-have the natural mix of their protocol, without draws at the boundary.
+The families are those of docs/guide/classifier.md. Seeds of training and test differ, and test
+legs have the natural mix of their protocol, without draws at the boundary.
 """
 
 import argparse

@@ -6,7 +6,8 @@ default model itself. Goes on where it was interrupted:
 
     python training/learning_curve.py [--data data/default] [--sizes 3000 10000 ...]
 
-Writes learning-curve.json and learning-curve.png, and prints the table of docs/classifier.md.
+Writes learning-curve.json and learning-curve.png, and prints the table of
+docs/results/classifier.md.
 """
 
 import argparse

@@ -19,7 +19,7 @@ hold with probability 0.95.
 
 The verdict is "good enough" where at least 95 % of the legs are in the model's
 domain, balanced accuracy is at least 0.99, at least 97 % of the legs within
-15 % of the boundary are told rightly, and the interval of the pruner's recall
+15 % of the boundary are judged rightly, and the interval of the pruner's recall
 reaches the recall asked for; "retrain" otherwise, with what falls short; "too
 few legs" with less than 50 legs of a class or 100 within 15 % of the boundary.
 

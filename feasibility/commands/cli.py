@@ -17,6 +17,7 @@ from feasibility.commands import (
 )
 from feasibility.commands.options import CommandParser
 from feasibility.errors import InputError, MissingDependencyError
+from feasibility.runtime.interrupts import end_output, interrupt_code, interruptible
 from feasibility.sims_flanagan.fast.compilation import prefer_fast_compilation
 
 _DESCRIPTION: Final = """\
@@ -37,18 +38,23 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return the exit code.
 
     0: done; 1: a worker process died; 2: input that cannot be used, with one
-    line on stderr; 130: interrupted.
+    line on stderr; 130 after Ctrl-C, 143 after SIGTERM.
     """
     prefer_fast_compilation()
-    try:
-        options = _parser().parse_args(arguments)
-        return int(options.run(options))
-    except (InputError, MissingDependencyError) as error:
-        print(f"feasibility: {error}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        print("feasibility: interrupted", file=sys.stderr)
-        return 130
+    with interruptible():
+        try:
+            options = _parser().parse_args(arguments)
+            return int(options.run(options))
+        except (InputError, MissingDependencyError) as error:
+            print(f"feasibility: {error}", file=sys.stderr)
+            return 2
+        except KeyboardInterrupt:
+            print("feasibility: interrupted", file=sys.stderr)
+            return interrupt_code() or 130
+        except BrokenPipeError:
+            return 0
+        finally:
+            end_output()
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -21,7 +21,7 @@ Repeat the paper's experiments and set our numbers beside its own.
   feasibility study all --preset quick                      minutes
   feasibility study all --preset laptop --catalogue FILE    some hours on 2 cores
   feasibility study data_size --preset quick                one experiment
-  feasibility study report --docs docs/study.md             the report as a document
+  feasibility study report --docs docs/results/study.md             the report as a document
 
 The legs (the paper's Table 1, labelled by the maximum initial mass) are made
 first, unless --data names a dataset of the protocol table1. Every experiment

@@ -1,6 +1,6 @@
 """Datasets of labelled legs: protocols, samplers, generation, reading and splits.
 
-Floor 4 of the house: knows the leg solvers and nothing above them.
+Knows the leg solvers and nothing above them.
 """
 
 from feasibility.dataset.columns import COLUMNS, Column

@@ -1,6 +1,6 @@
 """Orbits: element conversions, catalogues of bodies, their ephemerides and neighbours.
 
-Floor 2 of the house: knows the vocabulary and nothing above it. Importing it
+Knows the vocabulary and nothing above it. Importing it
 is cheap; the compiled kernels are loaded when they are first used.
 """
 

@@ -33,7 +33,8 @@ def interruptible() -> Iterator[None]:
         yield
     finally:
         for number, handler in before.items():
-            signal.signal(number, handler)
+            # An interrupted program is about to end; a signal on the way out must not change how.
+            signal.signal(number, signal.SIG_IGN if _received else handler)
 
 
 def interrupt_code() -> int:

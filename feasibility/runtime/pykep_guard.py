@@ -105,7 +105,7 @@ def _import_with_stand_ins() -> Any:
     try:
         return importlib.import_module("pykep")
     finally:
-        # Whoever asks for the real modules later shall get them, not our empty ones.
+        # Whoever asks for the real modules later should get them, not our empty ones.
         for name in _STAND_INS:
             if sys.modules.get(name) is stand_ins[name]:
                 del sys.modules[name]

@@ -73,7 +73,7 @@ class Assessment:
     legs, unsolved : int
         Legs judged, and those whose m* the solver did not find.
     balanced_accuracy : float
-        Mean of the shares of feasible and of infeasible legs that are told rightly at
+        Mean of the shares of feasible and of infeasible legs that are judged rightly at
         probability 0.5, among legs that were not drawn near the boundary.
     balanced_interval : pair of float
         Mean of the ends of both shares' intervals.
@@ -201,7 +201,7 @@ def judgement(
     recall_asked: float,
     recall: Share,
 ) -> tuple[str, tuple[str, ...]]:
-    """Return the verdict and its reasons: docs/spacecraft.md states the rule.
+    """Return the verdict and its reasons: docs/guide/spacecraft.md states the rule.
 
     Parameters are those of `Assessment`; `sides` are the shares behind the balanced accuracy.
     """

@@ -42,8 +42,8 @@ def run(context: Context) -> Result:
             "All models learn from balanced sets and are tested on the same balanced set of "
             "pairs of bodies that none of them has seen; threshold 0.5. ± is one standard "
             "deviation over the seeds. The margin model is ours "
-            "(docs/classifier.md): it learns m* of its legs, a part of DNN1's, of which it holds "
-            "out its own validation and calibration legs."
+            "(docs/guide/classifier.md): it learns m* of its legs, a part of DNN1's, of which it "
+            "holds out its own validation and calibration legs."
         ),
         findings=tuple(_findings(outcomes)),
         tables=(_table(outcomes), _margin_table(outcomes)),

@@ -91,8 +91,8 @@ def run(context: Context) -> Result:
             "Every model learns from balanced draws of growing size; the draws of one seed are "
             "nested. Error bars are one standard deviation over the seeds, which change the draw "
             "and the training. The test set is always the same. The margin model "
-            "(docs/classifier.md) learns m* of the same draws, of which it holds out its own "
-            "validation and calibration legs."
+            "(docs/guide/classifier.md) learns m* of the same draws, of which it holds out its "
+            "own validation and calibration legs."
         ),
         findings=tuple(_findings(curves)),
         tables=(table, elbows),

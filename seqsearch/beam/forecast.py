@@ -101,7 +101,7 @@ class Forecast:
     problem : Problem
         What hops there are.
     predictor : LegPredictor
-        Whom to ask. A `QuickPredictor` is asked for its quick answers first.
+        Predicts the legs. A `QuickPredictor` is asked for its quick answers first.
     neighbours : OrbitalNeighbours
         Which targets are looked at.
     threads : int

@@ -20,7 +20,7 @@ from seqsearch.settings import SearchSettings
 
 _FIRST_S: Final = 40.0
 _FIRST_SHARE: Final = 0.25
-"""The first pass takes so many seconds, but no more than this share of the limit."""
+"""Seconds of the first pass, and the largest share of the limit that it may take."""
 
 _GROWTH: Final = 3.0
 _LONGEST_SCOUTED_S: Final = 120.0
@@ -158,7 +158,7 @@ class ClockPacing:
         *,
         scouted: bool,
     ) -> SearchSettings:
-        """Set the time at which the pass shall end; about as many starts as the beam is wide."""
+        """Set the time at which the pass is to end; about as many starts as the beam is wide."""
         remaining = self._remaining_s()
         wanted = self._first_s * _GROWTH ** min(pass_number - 1, 20)
         if scouted:

@@ -72,7 +72,7 @@ class Passes:
         state : SearchState
             Gets the settings and the guide of each pass, and its start nodes in the tree.
         report : callable
-            Told the start nodes that scouts led to: what they found is not to be lost.
+            Called with the start nodes that scouts led to: what they found must not be lost.
         """
         if state.waiting is not None:
             self._set_effort(state)

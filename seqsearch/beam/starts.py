@@ -23,7 +23,7 @@ _CROWD: Final = 8
 
 _SCREEN_NEAR: Final = 30
 _SCREEN_TIMES: Final = (0.5, 0.75, 1.0)
-"""The screen asks for so many nearest bodies, at these shares of the reference flight time."""
+"""The screen asks for this many nearest bodies, at these shares of the reference flight time."""
 
 _SOFT: Final = 0.3
 """A target whose log(m*/m0) is this much below 0 counts nothing, one at 0 or more counts 1."""
@@ -102,7 +102,7 @@ def reachable_starts(
     problem, neighbours, settings, rng
         As for `dense_starts`.
     predictor : LegPredictor
-        Whom to ask; quick answers will do.
+        Answers the questions; quick answers will do.
     threads : int
         How many questions are worked on at once; the answer does not depend on it.
 

@@ -25,7 +25,7 @@ def add_limits(command: argparse.ArgumentParser) -> None:
         "--max-solves",
         type=int,
         metavar="N",
-        help="stop after so many full optimisations in all; passes go on until then",
+        help="stop after N full optimisations in all; passes go on until then",
     )
     add_workers(command)
 

@@ -90,7 +90,7 @@ def run_search(
 ) -> int:
     """Run a search as the command line asks for it and return the exit code.
 
-    With `polish_s`, the best tours are polished for so many seconds afterwards.
+    With `polish_s`, the best tours are polished for that many seconds afterwards.
     A fleet polishes each probe within the time limit instead.
 
     Everything is read and checked before the run folder is made.

@@ -37,7 +37,7 @@ _LEISURE: Final = (1.0, 1.12)
 """Flight times that are tried, as multiples of the shortest flyable: slower legs burn less."""
 
 _MARGIN: Final = 0.003
-"""Logarithm of the predicted margin that a leg shall have: the predictor's error."""
+"""Logarithm of the predicted margin that a leg is to have: the predictor's error."""
 
 _THRUST_SHARE: Final = 0.8
 """Share of the flight time that the engine runs, for masses guessed backward."""

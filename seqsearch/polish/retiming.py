@@ -44,7 +44,7 @@ _REMEMBERED: Final = 8
 """Timetables whose tangents are kept."""
 
 _SPARE_KG: Final = 0.1
-"""Propellant that shall be left, so that rounding cannot leave too little."""
+"""Propellant that is to be left, so that rounding cannot leave too little."""
 
 _SMALL_DEBT_DAYS: Final = 30.0
 """Merit beyond the duration that is worth an attempt to settle it."""

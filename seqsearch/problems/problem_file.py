@@ -18,6 +18,7 @@ from seqsearch.core.problem import Problem
 from seqsearch.problems.registry import ProblemPlugin, builtin_problems, plugins
 from seqsearch.problems.rendezvous import RendezvousProblem
 from seqsearch.settings import SearchSettings
+from seqsearch.tours.dates import mjd_of
 
 _MOVED: Final = {
     "frontier": ("frontier", "kind"),
@@ -66,7 +67,7 @@ class SpacecraftTable(_Table, frozen=True, kw_only=True):
 
 @final
 class MissionTable(_Table, frozen=True, kw_only=True):
-    """Table ``[mission]``."""
+    """Table ``[mission]``; epochs in MJD, or as dates such as ``2030-01-01``."""
 
     first_departure_mjd: tuple[float, float]
     max_duration_days: float
@@ -175,6 +176,13 @@ def _decode(text: str, label: str) -> Config:
     plain = parse_toml(text, label)
     if isinstance(plain.get("search"), dict):
         plain["search"] = _upgraded(plain["search"], label)
+    mission = plain.get("mission")
+    if isinstance(mission, dict) and isinstance(mission.get("first_departure_mjd"), list):
+        # TOML has dates of its own, and people write them as texts too.
+        mission["first_departure_mjd"] = [
+            mjd_of(epoch, f"{label}: mission.first_departure_mjd")
+            for epoch in mission["first_departure_mjd"]
+        ]
     return convert_table(plain, _whole(), label)
 
 

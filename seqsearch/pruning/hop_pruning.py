@@ -1,4 +1,4 @@
-"""`keep_hops`: which hops survive pruning, and what was dropped by whom."""
+"""`keep_hops`: which hops survive pruning, and what each pruner dropped."""
 
 from dataclasses import dataclass, field
 from typing import final

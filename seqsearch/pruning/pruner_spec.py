@@ -73,7 +73,7 @@ def _parse_one(part: str, spec: str) -> Pruner:
 
 
 def _classifier_pruner(path: str) -> Callable[..., Pruner]:
-    # Imported here: a search without a model shall not pay for the classifier's kernels.
+    # Imported here: a search without a model should not pay for the classifier's kernels.
     from feasibility.classifier.classifier import FeasibilityClassifier
     from feasibility.pruners.classifier import ClassifierPruner
 

@@ -91,7 +91,7 @@ def _audit_predictor(config: Config, pruner: AllOf) -> LegPredictor | None:
     """Return what sorts the audit's legs: the default model, where the pruner has none."""
     if config.search.audit.per_rank == 0 or pruner.pruners == ():
         return None
-    # Imported here: a search without audit and model shall not pay for the model's kernels.
+    # Imported here: a search without audit and model should not pay for the model's kernels.
     from feasibility.classifier.classifier import FeasibilityClassifier
 
     return predictor_of(pruner) or FeasibilityClassifier.load()

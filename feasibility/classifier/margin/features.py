@@ -58,7 +58,7 @@ FEATURES: Final = (
     "log_largest_impulse",
     *(f"thrust_{node}_{axis}" for node in (0, 5, 10, 14, 19) for axis in ("r", "t", "n", "size")),
 )
-"""Names of all features, all without unit; docs/classifier.md has the formulas."""
+"""Names of all features, all without unit; docs/guide/classifier.md has the formulas."""
 
 DOMAIN_QUANTITIES: Final = (
     "log_tof",

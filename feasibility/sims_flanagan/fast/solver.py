@@ -1,6 +1,6 @@
 """Fast batch solvers for Sims-Flanagan legs: maximum initial mass and minimum propellant.
 
-The method is described in docs/solver.md. Where the reference solver hands one
+The method is described in docs/guide/solver.md. Where the reference solver hands one
 leg at a time to a general optimiser, these run a whole batch in compiled kernels;
 both solve the same problem, and every solution is confirmed by pykep's own leg.
 """

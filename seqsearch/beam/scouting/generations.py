@@ -55,7 +55,7 @@ class ScoutedPasses:
     Parameters
     ----------
     scouts : Scouts
-        Whom to send.
+        What is sent out.
     pacing : Pacing
         How long they may take.
     budget : Budget

@@ -11,7 +11,7 @@ from seqsearch.core.problem import Problem
 
 _SPREADS_DAYS: Final = (30.0, 60.0, 120.0, 250.0)
 _NEAR: Final = (5, 10, 16)
-"""Starts near an itinerary differ from it by up to so many days, and lie among so many nearest
+"""Starts near an itinerary differ from it by up to this many days, and lie among this many nearest
 bodies; one of each is drawn for a scout."""
 
 _FIRST_BODIES: Final = 4

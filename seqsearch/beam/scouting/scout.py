@@ -68,7 +68,7 @@ def scout(
     problem : Problem
         What to solve.
     forecast : Forecast
-        Whom to ask.
+        Predicts the legs.
     starts : Nodes
         Start nodes, at least one.
     settings : SearchSettings

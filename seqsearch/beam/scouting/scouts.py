@@ -30,7 +30,7 @@ _SLICE_DAYS: Final = 300.0
 """About the length of the part of the departure window that one scout explores."""
 
 _SLICE_EPOCHS: Final = 6
-"""A slice is looked at at so many epochs."""
+"""Epochs at which a slice is looked at."""
 
 _EXPLORING: Final = 0.4
 """Share of the scouts that explore."""
@@ -71,7 +71,7 @@ class Scouts:
     problem : Problem
         What to solve.
     predictor : LegPredictor
-        Whom they ask.
+        Predicts their legs.
     settings : SearchSettings
         Settings of the search.
     executor : concurrent.futures.Executor, optional

@@ -23,7 +23,7 @@ def test_the_example_says_what_the_defaults_are(tmp_path):
 
 
 def test_the_document_shows_the_example():
-    document = Path(__file__).parents[3] / "docs" / "spacecraft.md"
+    document = Path(__file__).parents[3] / "docs" / "guide" / "spacecraft.md"
     assert EXAMPLE in document.read_text(encoding="utf-8")
 
 

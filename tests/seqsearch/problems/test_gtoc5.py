@@ -17,13 +17,13 @@ from seqsearch.core.custom_moves import CustomMoves
 from seqsearch.core.nodes import Nodes
 from seqsearch.core.optimisation import solve_hops
 from seqsearch.core.problem import Problem
-from seqsearch.problems.gtoc5.directions import even_directions
 from seqsearch.problems.gtoc5.element_distance import phase_free_points
 from seqsearch.problems.gtoc5.forecast import FLY_BY_STRETCH, Gtoc5Forecast
-from seqsearch.problems.gtoc5.lambert_departure import lambert_departure
 from seqsearch.problems.gtoc5.problem import Gtoc5Problem
 from seqsearch.problems.gtoc5.rules import Gtoc5Rules
 from seqsearch.problems.gtoc5.self_fly_by import self_fly_by_delta_v, shortest_self_fly_by_days
+from seqsearch.problems.moves.directions import even_directions
+from seqsearch.problems.moves.lambert_departure import lambert_departure
 from seqsearch.problems.problem_file import build_problem, read_config, to_toml, with_catalogue
 from seqsearch.settings import SearchSettings as Settings
 from seqsearch.tours.tour_files import read_tour, to_csv, to_json
