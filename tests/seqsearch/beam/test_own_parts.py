@@ -9,7 +9,7 @@ from seqsearch.beam.expanders.grid import GridExpander
 from seqsearch.beam.frontiers.depth import DepthFrontier
 from seqsearch.beam.frontiers.protocol import Frontier
 from seqsearch.beam.frontiers.time_slices import TimeSliceFrontier
-from seqsearch.core.nodes import Nodes, no_nodes
+from seqsearch.core.nodes import no_nodes
 from tests.helpers.predictors import Toy
 from tests.helpers.problems import small_problem, small_settings
 
@@ -103,30 +103,31 @@ def test_one_made_anew_for_each_pass_and_a_ranking_of_ones_own_go_together(probl
     assert {record.pass_number for record in result.counters} == {1, 2}
 
 
-class _FirstChild:
-    """Depth first: goes on with one node at a time, the one found last."""
+class _Heaviest:
+    """Goes on from the heaviest node alone."""
 
     def __init__(self):
-        self._waiting = []
+        self._nodes = no_nodes()
 
     def admit(self, nodes, /, width, spare=1.0):
-        return np.argsort(nodes.mass)[::-1][:1]
+        return np.argsort(-nodes.mass)[:1]
 
     def push(self, nodes, /):
-        self._waiting.append(nodes)
+        self._nodes = nodes
 
     def pop(self, width):
-        return self._waiting.pop()
+        nodes, self._nodes = self._nodes, no_nodes()
+        return nodes
 
     def waiting(self):
-        return Nodes.concatenate(self._waiting) if self._waiting else no_nodes()
+        return self._nodes
 
 
 def test_another_order_of_search_is_a_frontier_of_a_few_lines(problem):
     result = search(
         problem,
         settings=small_settings(solves_per_rank=40),
-        frontier=lambda settings, problem, ranking: _FirstChild(),
+        frontier=lambda settings, problem, ranking: _Heaviest(),
     )
     kept = [record.kept for record in result.counters]
     assert set(kept) <= {0, 1}
