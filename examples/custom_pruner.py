@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from feasibility import AllOf, Legs, Mima2Pruner, Spacecraft, check_pruner
 from feasibility.constants import mjd_to_mjd2000
 from feasibility.orbits import synthetic_main_belt
-from seqsearch import Problem, SearchSettings, search
+from seqsearch import RendezvousProblem, SearchSettings, search
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ def main() -> None:
     check_pruner(mine)
     print("NearlyCoplanar keeps the contract")
 
-    problem = Problem(
+    problem = RendezvousProblem(
         name="example",
         catalogue=synthetic_main_belt(options.bodies, np.random.default_rng(1)),
         spacecraft=Spacecraft(m_dry=800.0, thrust=0.3, isp=3000.0),

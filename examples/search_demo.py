@@ -10,7 +10,7 @@ import numpy as np
 from feasibility import Spacecraft
 from feasibility.constants import mjd_to_mjd2000
 from feasibility.orbits import synthetic_main_belt
-from seqsearch import Problem, SearchSettings, search, verify_tour
+from seqsearch import RendezvousProblem, SearchSettings, search, verify_tour
 
 
 def main() -> None:
@@ -21,7 +21,7 @@ def main() -> None:
     parser.add_argument("--days", type=float, default=1000.0, help="longest duration of the tour")
     options = parser.parse_args()
 
-    problem = Problem(
+    problem = RendezvousProblem(
         name="example",
         catalogue=synthetic_main_belt(options.bodies, np.random.default_rng(1)),
         spacecraft=Spacecraft(m_dry=800.0, thrust=0.3, isp=3000.0),

@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from seqsearch.beam.beam_search import search
+    from seqsearch.beam.rankings.check import check_ranking
     from seqsearch.beam.rankings.protocol import Ranking
     from seqsearch.beam.rankings.time_propellant import TimePropellantRanking
     from seqsearch.beam.result import SearchResult
+    from seqsearch.core.check_problem import check_problem
     from seqsearch.core.problem import Problem
     from seqsearch.problems.problem_file import build_problem, load_problem, read_config
     from seqsearch.problems.rendezvous import RendezvousProblem
@@ -32,6 +34,8 @@ _HOMES = {
     "Tour": "seqsearch.tours.tour",
     "Verification": "seqsearch.tours.checks",
     "build_problem": "seqsearch.problems.problem_file",
+    "check_problem": "seqsearch.core.check_problem",
+    "check_ranking": "seqsearch.beam.rankings.check",
     "load_problem": "seqsearch.problems.problem_file",
     "read_config": "seqsearch.problems.problem_file",
     "read_tour": "seqsearch.tours.tour_files",
@@ -49,6 +53,8 @@ __all__ = [
     "Tour",
     "Verification",
     "build_problem",
+    "check_problem",
+    "check_ranking",
     "load_problem",
     "read_config",
     "read_tour",

@@ -141,6 +141,20 @@ def _least_time(lam: float, q: float, turns: float) -> tuple[float, float]:
     return x, time
 
 
+@inner_kernel
+def _direct_guess(target: float, direct: float, lam: float, q: float) -> float:
+    """Return the first x of the direct transfer, equation 30; `direct` is T(0)."""
+    one_lam = q / (1.0 + lam) if lam > 0.0 else 1.0 - lam
+    parabolic = 2.0 / 3.0 * one_lam * (1.0 + lam + lam * lam)
+    if target >= direct:
+        return float((direct / target) ** (2.0 / 3.0) - 1.0)
+    if target <= parabolic:
+        lam5 = one_lam * (1.0 + lam * (1.0 + lam * (1.0 + lam * (1.0 + lam))))
+        return 2.5 * parabolic * (parabolic - target) / (target * lam5) + 1.0
+    power = math.log(2.0) / math.log(direct / parabolic)
+    return float((direct / target) ** power - 1.0)
+
+
 @kernel
 def lambert(
     r1: _Array, r2: _Array, tof: float, max_revs: int, mu: float, v1: _Array, v2: _Array
@@ -197,7 +211,6 @@ def lambert(
     gamma = math.sqrt(0.5 * mu * semi)
     q = chord / semi
     target = math.sqrt(2.0 * mu / (semi * semi * semi)) * tof
-    one_lam = q / (1.0 + lam) if lam > 0.0 else 1.0 - lam
     direct = math.atan2(math.sqrt(q), lam) + lam * math.sqrt(q)
     for revs in range(max_revs + 1):
         turns = math.pi * revs
@@ -210,16 +223,7 @@ def lambert(
                 return
         for side in range(1 if revs == 0 else 2):
             if revs == 0:
-                # Equation 30.
-                parabolic = 2.0 / 3.0 * one_lam * (1.0 + lam + lam * lam)
-                if target >= direct:
-                    x = (direct / target) ** (2.0 / 3.0) - 1.0
-                elif target <= parabolic:
-                    lam5 = one_lam * (1.0 + lam * (1.0 + lam * (1.0 + lam * (1.0 + lam))))
-                    x = 2.5 * parabolic * (parabolic - target) / (target * lam5) + 1.0
-                else:
-                    power = math.log(2.0) / math.log(direct / parabolic)
-                    x = (direct / target) ** power - 1.0
+                x = _direct_guess(target, direct, lam, q)
                 x = _solve(x, -1.0, np.inf, False, target, lam, q, turns, _STEP_TOLERANCE)
             elif side == 0:
                 # Equation 31, left and right.

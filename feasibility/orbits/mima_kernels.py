@@ -213,6 +213,43 @@ def _accelerations(
 
 
 @inner_kernel
+def _project(
+    rv: _Array, dv1: _Array, dv2: _Array, tof: float, mu: float, rhs: _Array
+) -> tuple[_Orbit, _Effect]:
+    """Write the impulses' effect at epoch 0, in the arc's plane and across it; return the arc.
+
+    In the plane and across it, motion is independent to first order. Parameters as for
+    `mima2_acceleration`, `rhs` as for `_accelerations`.
+
+    Returns
+    -------
+    orbit : tuple of float
+        The arc at departure.
+    end : tuple of float
+        `_plane_stm` at arrival.
+    """
+    r0 = math.sqrt(rv[0] * rv[0] + rv[1] * rv[1] + rv[2] * rv[2])
+    x, y, z = rv[0] / r0, rv[1] / r0, rv[2] / r0
+    vr = x * rv[3] + y * rv[4] + z * rv[5]
+    tx, ty, tz = rv[3] - vr * x, rv[4] - vr * y, rv[5] - vr * z
+    vt = math.sqrt(tx * tx + ty * ty + tz * tz)
+    tx, ty, tz = tx / vt, ty / vt, tz / vt
+    hx, hy, hz = y * tz - z * ty, z * tx - x * tz, x * ty - y * tx
+    orbit = (r0, vr, vt, 2.0 * mu / r0 - vr * vr - vt * vt)
+    end = _plane_stm(tof, orbit, mu, tof)
+    u = x * dv2[0] + y * dv2[1] + z * dv2[2]
+    v = tx * dv2[0] + ty * dv2[1] + tz * dv2[2]
+    w = hx * dv2[0] + hy * dv2[1] + hz * dv2[2]
+    rhs[0] = end[0] * u + end[1] * v
+    rhs[1] = end[2] * u + end[3] * v
+    rhs[2] = end[4] * u + end[5] * v + x * dv1[0] + y * dv1[1] + z * dv1[2]
+    rhs[3] = end[6] * u + end[7] * v + tx * dv1[0] + ty * dv1[1] + tz * dv1[2]
+    rhs[4] = end[8] * w
+    rhs[5] = end[9] * w + hx * dv1[0] + hy * dv1[1] + hz * dv1[2]
+    return orbit, end
+
+
+@inner_kernel
 def mima2_acceleration(
     rv: _Array,
     dv1: _Array,
@@ -246,25 +283,7 @@ def mima2_acceleration(
     float
         NaN where the search meets a singular system.
     """
-    # The plane of the arc: in it and across it, motion is independent to first order.
-    r0 = math.sqrt(rv[0] * rv[0] + rv[1] * rv[1] + rv[2] * rv[2])
-    x, y, z = rv[0] / r0, rv[1] / r0, rv[2] / r0
-    vr = x * rv[3] + y * rv[4] + z * rv[5]
-    tx, ty, tz = rv[3] - vr * x, rv[4] - vr * y, rv[5] - vr * z
-    vt = math.sqrt(tx * tx + ty * ty + tz * tz)
-    tx, ty, tz = tx / vt, ty / vt, tz / vt
-    hx, hy, hz = y * tz - z * ty, z * tx - x * tz, x * ty - y * tx
-    orbit = (r0, vr, vt, 2.0 * mu / r0 - vr * vr - vt * vt)
-    end = _plane_stm(tof, orbit, mu, tof)
-    u = x * dv2[0] + y * dv2[1] + z * dv2[2]
-    v = tx * dv2[0] + ty * dv2[1] + tz * dv2[2]
-    w = hx * dv2[0] + hy * dv2[1] + hz * dv2[2]
-    rhs[0] = end[0] * u + end[1] * v
-    rhs[1] = end[2] * u + end[3] * v
-    rhs[2] = end[4] * u + end[5] * v + x * dv1[0] + y * dv1[1] + z * dv1[2]
-    rhs[3] = end[6] * u + end[7] * v + tx * dv1[0] + ty * dv1[1] + tz * dv1[2]
-    rhs[4] = end[8] * w
-    rhs[5] = end[9] * w + hx * dv1[0] + hy * dv1[1] + hz * dv1[2]
+    orbit, end = _project(rv, dv1, dv2, tof, mu, rhs)
     # At both ends one acceleration is unbounded, so that their relative difference is known.
     x1, f1 = 1.0, -1.0
     x2, f2 = 0.0, 1.0

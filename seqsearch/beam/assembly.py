@@ -26,6 +26,7 @@ from seqsearch.beam.starts import make_starts
 from seqsearch.beam.state import SearchState
 from seqsearch.budget import Budget
 from seqsearch.core.optimisation import LegOptimiser
+from seqsearch.core.possible import check_possible
 from seqsearch.core.problem import Problem
 from seqsearch.pruning.pruner_spec import parse_pruner, predictor_of
 from seqsearch.settings import SearchSettings
@@ -160,8 +161,9 @@ def assemble(
     Raises
     ------
     InputError
-        A pruner specification that cannot be read.
+        A pruner specification that cannot be read, or a mission in which no hop fits.
     """
+    check_possible(problem, settings)
     pruner = pruner or parse_pruner(settings.pruner)
     pruner = pruner if isinstance(pruner, AllOf) else AllOf(pruner)
     predictor = predictor or predictor_of(pruner)

@@ -18,6 +18,7 @@ from seqsearch.core.problem import Problem
 from seqsearch.problems.registry import ProblemPlugin, builtin_problems, plugins
 from seqsearch.problems.rendezvous import RendezvousProblem
 from seqsearch.settings import SearchSettings
+from seqsearch.tours.dates import mjd_of
 
 _MOVED: Final = {
     "frontier": ("frontier", "kind"),
@@ -66,7 +67,7 @@ class SpacecraftTable(_Table, frozen=True, kw_only=True):
 
 @final
 class MissionTable(_Table, frozen=True, kw_only=True):
-    """Table ``[mission]``."""
+    """Table ``[mission]``; epochs in MJD, or as dates such as ``2030-01-01``."""
 
     first_departure_mjd: tuple[float, float]
     max_duration_days: float
@@ -108,7 +109,19 @@ class Config(_Table, frozen=True, kw_only=True):
 
 @cache
 def _whole() -> type[Config]:
-    """Return the struct of problem files with a field for the rules of each plug-in."""
+    """Return the struct of problem files with a field for the rules of each plug-in.
+
+    Raises
+    ------
+    InputError
+        As `plugins`, or a plug-in's table has the name of one that all problem files have.
+    """
+    ours = [name for name in Config.__struct_fields__ if name in plugins()]
+    if ours:
+        raise InputError(
+            f"problem plug-in {ours[0]}: expected another name, as every problem file has a "
+            f"table [{ours[0]}]"
+        )
     tables = [
         (plugin.name, plugin.rules | None, None)
         for plugin in plugins().values()
@@ -163,6 +176,13 @@ def _decode(text: str, label: str) -> Config:
     plain = parse_toml(text, label)
     if isinstance(plain.get("search"), dict):
         plain["search"] = _upgraded(plain["search"], label)
+    mission = plain.get("mission")
+    if isinstance(mission, dict) and isinstance(mission.get("first_departure_mjd"), list):
+        # TOML has dates of its own, and people write them as texts too.
+        mission["first_departure_mjd"] = [
+            mjd_of(epoch, f"{label}: mission.first_departure_mjd")
+            for epoch in mission["first_departure_mjd"]
+        ]
     return convert_table(plain, _whole(), label)
 
 

@@ -13,6 +13,8 @@ from functools import cache
 from importlib import metadata, resources
 from typing import Any, Final, final
 
+import msgspec
+
 from feasibility import InputError
 from seqsearch.core.problem import Problem
 from seqsearch.problems.rendezvous import RendezvousProblem
@@ -55,7 +57,7 @@ def plugins() -> dict[str, ProblemPlugin]:
     ------
     InputError
         A plug-in cannot be imported, has rules and no way to build a problem or the other way
-        round, or a name that occurs twice or cannot be that of a table.
+        round, rules that are no struct, or a name that occurs twice or cannot be that of a table.
     """
     found: dict[str, ProblemPlugin] = {}
     for entry in sorted(metadata.entry_points(group=ENTRY_POINTS), key=lambda entry: entry.name):
@@ -101,4 +103,6 @@ def _loaded(entry: metadata.EntryPoint) -> ProblemPlugin:
     rules, build = getattr(module, "RULES", None), getattr(module, "build", None)
     if (rules is None) != (build is None):
         raise InputError(f"{label}: {entry.value} has one of RULES and build, expected both")
+    if rules is not None and not (isinstance(rules, type) and issubclass(rules, msgspec.Struct)):
+        raise InputError(f"{label}: RULES of {entry.value} is no msgspec.Struct")
     return ProblemPlugin(entry.name, rules, build, files)

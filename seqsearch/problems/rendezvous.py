@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import final
+from typing import Final, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,9 @@ from seqsearch.core.nodes import Nodes
 from seqsearch.core.tree import FlownLeg
 from seqsearch.settings import SearchSettings
 from seqsearch.tours.tour import TourRules
+
+_MAX_ACCELERATION: Final = 0.01
+"""m/s2; electric engines give 1e-5 to 1e-3."""
 
 
 @final
@@ -81,6 +84,12 @@ class RendezvousProblem:
             raise InputError(
                 f"problem {self.name}: dry mass {self.spacecraft.m_dry:g} kg is not below the "
                 f"wet mass {self.m0:g} kg"
+            )
+        acceleration = self.spacecraft.thrust / self.m0
+        if acceleration > _MAX_ACCELERATION:
+            raise InputError(
+                f"problem {self.name}: thrust {self.spacecraft.thrust:g} N on {self.m0:g} kg is "
+                f"{acceleration:.2g} m/s2; is it in mN?"
             )
         earliest, latest = self.first_departure_mjd2000
         if latest < earliest:

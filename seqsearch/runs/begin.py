@@ -1,19 +1,27 @@
 """`begin_search`: makes a run folder and searches with a configuration."""
 
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 
+from feasibility.constants import YEAR_DAYS
 from feasibility.runtime.interrupts import say
 from feasibility.runtime.locks import folder_lock
 from seqsearch.beam.state import SearchState
 from seqsearch.budget import Limits
+from seqsearch.core.possible import check_possible
+from seqsearch.core.problem import Problem
 from seqsearch.core.recording import record_tour
 from seqsearch.problems.problem_file import Config, build_problem
 from seqsearch.pruning.pruner_spec import parse_pruner
 from seqsearch.runs.checkpoint import Checkpoints, Origin, catalogue_digest
 from seqsearch.runs.run_folder import RunFolder
 from seqsearch.runs.session import run_session
+from seqsearch.tours.dates import date_of
+
+_OLD_DAYS: Final = 50 * YEAR_DAYS
+"""Elements that are further from the mission than this say little, or its window is no MJD."""
 
 
 def begin_search(config: Config, path: Path, seed: int, limits: Limits) -> int:
@@ -26,6 +34,7 @@ def begin_search(config: Config, path: Path, seed: int, limits: Limits) -> int:
     """
     pruner = parse_pruner(config.search.pruner)
     problem = build_problem(config)
+    check_possible(problem, config.search)
     folder = RunFolder.create(path, config, seed)
     rng = np.random.default_rng(seed)
     state = SearchState(settings=config.search, rng_state=dict(rng.bit_generator.state))
@@ -44,6 +53,7 @@ def begin_search(config: Config, path: Path, seed: int, limits: Limits) -> int:
             f"{problem.name}: {len(problem.catalogue)} bodies from {problem.catalogue.source}, "
             f"seed {seed}, writing to {folder.path}"
         )
+        say(_window_line(problem))
         return run_session(
             folder,
             checkpoints,
@@ -53,3 +63,16 @@ def begin_search(config: Config, path: Path, seed: int, limits: Limits) -> int:
             pruner=pruner,
             limits=limits,
         )
+
+
+def _window_line(problem: Problem) -> str:
+    """Return when the tour may begin, and a warning where the table is of another age."""
+    window = problem.first_departure_mjd2000
+    line = f"first departure {date_of(window[0])} to {date_of(window[1])}"
+    age_days = float(np.median(problem.catalogue.epoch_mjd2000)) - float(np.mean(window))
+    if abs(age_days) > _OLD_DAYS:
+        line += (
+            f"; the table's elements are {abs(age_days) / YEAR_DAYS:.0f} years "
+            f"{'older' if age_days < 0 else 'younger'}: is the window in MJD?"
+        )
+    return line

@@ -20,10 +20,28 @@ def kinds_of(ours: Iterable[type[_T]], entry_points: str) -> dict[str, type[_T]]
         Tagged structs of this package.
     entry_points : str
         Group of the entry points by which other packages bring more, named as their kinds.
+
+    Raises
+    ------
+    InputError
+        A class cannot be loaded, has another tag than the name of its entry point, or brings a
+        kind that there is already.
     """
     kinds = {_tag(kind): kind for kind in ours}
     for entry in metadata.entry_points(group=entry_points):
-        kinds.setdefault(entry.name, entry.load())
+        label = f"kind {entry.name!r} of {entry_points}"
+        if entry.name in kinds:
+            raise InputError(f"{label}: {entry.value} brings a kind that there is already")
+        try:
+            kind = entry.load()
+            tag = _tag(kind)
+        except Exception as error:
+            raise InputError(
+                f"{label}: {entry.value} cannot be loaded ({type(error).__name__}: {error})"
+            ) from error
+        if tag != entry.name:
+            raise InputError(f"{label}: {entry.value} has the tag {tag!r}, expected the same name")
+        kinds[entry.name] = kind
     return kinds
 
 

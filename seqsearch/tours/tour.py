@@ -4,6 +4,7 @@ from typing import Final, final
 
 from feasibility.constants import G0, MJD2000_MJD, MU_SUN
 from feasibility.errors import InputError
+from seqsearch.tours.dates import date_of
 from seqsearch.tours.events.protocol import TourEvent
 from seqsearch.tours.records import Record, TourBody, TourLeg
 from seqsearch.tours.scores.protocol import ScoreRule
@@ -113,13 +114,14 @@ class Tour(Record, frozen=True, kw_only=True):
     def table(self) -> str:
         """Return the legs as a text table."""
         header = (
-            f"{'leg':>3}  {'from':>7}  {'to':>7}  {'name':<18}  {'departure':>12}  "
-            f"{'arrival':>12}  {'days':>7}  {'m0 kg':>8}  {'mf kg':>8}  {'margin':>6}"
+            f"{'leg':>3}  {'from':>7}  {'to':>7}  {'name':<14}  {'departure, MJD':<20}  "
+            f"{'arrival':<10}  {'days':>7}  {'m0 kg':>8}  {'mf kg':>8}  {'margin':>6}"
         )
         lines = [header, "-" * len(header)]
         lines += [
-            f"{k:>3}  {leg.from_id:>7}  {leg.to_id:>7}  {self.body(leg.to_id).name[:18]:<18}  "
-            f"{leg.t_dep_mjd2000 + MJD2000_MJD:>12.3f}  {leg.t_arr_mjd2000 + MJD2000_MJD:>12.3f}  "
+            f"{k:>3}  {leg.from_id:>7}  {leg.to_id:>7}  {self.body(leg.to_id).name[:14]:<14}  "
+            f"{date_of(leg.t_dep_mjd2000)} {leg.t_dep_mjd2000 + MJD2000_MJD:>9.2f}  "
+            f"{date_of(leg.t_arr_mjd2000)}  "
             f"{leg.tof_days:>7.2f}  {leg.m0_kg:>8.2f}  {leg.m_final_kg:>8.2f}  {leg.margin:>6.3f}"
             for k, leg in enumerate(self.legs, 1)
         ]

@@ -67,6 +67,8 @@ def read_tour(path: Path) -> Tour:
     try:
         tour = _decoded(data)
     except (msgspec.DecodeError, KeyError, TypeError, AttributeError, RecursionError) as error:
+        if isinstance(error.__cause__, InputError):
+            raise InputError(f"{path}: {error.__cause__}") from None
         raise InputError(f"{path}: not a complete {FORMAT} file ({error})") from None
     except InputError as error:
         raise InputError(f"{path}: {error}") from None

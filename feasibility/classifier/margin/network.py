@@ -6,6 +6,8 @@ from typing import Any, Final, final
 import numpy as np
 from numpy.typing import NDArray
 
+from feasibility.runtime.blas import one_blas_thread
+
 _Array = NDArray[np.float64]
 
 INPUT_LIMIT: Final = 6.0
@@ -63,10 +65,11 @@ class MarginNet:
         n = len(X)
         out = np.empty((n, 2), dtype=np.float32)
         block = np.zeros((_BLOCK, X.shape[1]), dtype=np.float32)
-        for first in range(0, n, _BLOCK):
-            part = X[first : first + _BLOCK]
-            block[: len(part)] = self._standardised(part)
-            out[first : first + len(part)] = self._forward(block)[: len(part)]
+        with one_blas_thread():
+            for first in range(0, n, _BLOCK):
+                part = X[first : first + _BLOCK]
+                block[: len(part)] = self._standardised(part)
+                out[first : first + len(part)] = self._forward(block)[: len(part)]
         values = out.astype(np.float64)
         return values[:, 0] * self._unit, np.exp(values[:, 1]) * self._unit
 

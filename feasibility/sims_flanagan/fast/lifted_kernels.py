@@ -107,6 +107,91 @@ def draw_arc(
 
 
 @inner_kernel
+def _linearise_nodes(nodes: _Array, dv: _Array, n: int, first: bool, w: Workspace) -> bool:
+    """Write the jump of each node in elements, and its derivatives by impulse and node.
+
+    They go to w.n6[JUMPS], w.b[1] and the first n matrices of w.m. Returns False where an
+    orbit is no ellipse.
+    """
+    jumps, response, x = w.n6[JUMPS], w.b[1], w.v[X]
+    one, two = w.m[M_ONE], w.m[M_TWO]
+    for i in range(n):
+        from_elements(nodes[i], x)
+        if not first:
+            if not element_derivatives(x, int(0), one, w.v):
+                return False
+            for j in range(3):
+                x[3 + j] += dv[i, j]
+        if not to_elements(x, jumps[i]):
+            return False
+        for j in range(6):
+            jumps[i, j] -= nodes[i, j]
+        jumps[i, 5] = wrap(jumps[i, 5])
+        if first:
+            if not element_derivatives(x, int(3), two, w.v):
+                return False
+            for j in range(6):
+                for k in range(3):
+                    response[i, j, k] = two[j, k]
+                for k in range(6):
+                    w.m[i, j, k] = 1.0 if j == k else 0.0
+        else:
+            if not element_derivatives(x, int(0), two, w.v):
+                return False
+            for j in range(6):
+                for k in range(3):
+                    response[i, j, k] = two[j, 3 + k]
+            if not divide(two, one, w.m[i]):
+                return False
+    return True
+
+
+@inner_kernel
+def _condense(
+    e0: _Array, e1: _Array, longitude: float, dt: float, n: int, nodes: _Array, w: Workspace
+) -> None:
+    """Write how the end moves with each impulse, w.b[0], and by how much it is missed, w.v[GAP].
+
+    Also by how much the flow from the node before misses each node: w.n6[MOVED].
+    """
+    jumps, moved = w.n6[JUMPS], w.n6[MOVED]
+    b, response = w.b[0], w.b[1]
+    one, two, gap = w.m[M_ONE], w.m[M_TWO], w.v[GAP]
+    # Last node first: m = d(end)/d(elements after impulse i).
+    for j in range(6):
+        gap[j] = e1[j] - nodes[n - 1, j] - jumps[n - 1, j]
+        for k in range(6):
+            one[j, k] = 1.0 if j == k else 0.0
+    gap[5] = longitude - nodes[n - 1, 5] - jumps[n - 1, 5]
+    one[5, 0] = 0.5 * dt
+    gap[5] -= 0.5 * dt * (nodes[n - 1, 0] + jumps[n - 1, 0])
+    for i in range(n - 1, -1, -1):
+        for j in range(6):
+            for k in range(3):
+                value = 0.0
+                for q in range(6):
+                    value += one[j, q] * response[i, q, k]
+                b[i, j, k] = value
+        for j in range(6):
+            for k in range(6):
+                value = 0.0
+                for q in range(6):
+                    value += one[j, q] * w.m[i, q, k]
+                two[j, k] = value
+        span = dt if i > 0 else 0.5 * dt
+        for j in range(6):
+            before = nodes[i - 1, j] + jumps[i - 1, j] if i > 0 else e0[j]
+            moved[i, j] = before - nodes[i, j]
+        motion = nodes[i - 1, 0] + jumps[i - 1, 0] if i > 0 else e0[0]
+        moved[i, 5] += motion * span
+        for j in range(6):
+            for k in range(6):
+                one[j, k] = two[j, k]
+                gap[j] -= one[j, k] * moved[i, k]
+            one[j, 0] += one[j, 5] * span
+
+
+@inner_kernel
 def lifted_sweep(
     e0: _Array,
     e1: _Array,
@@ -130,82 +215,18 @@ def lifted_sweep(
     new z, -1 where the step fails, and the relative change of the impulses; leaves the
     full step in w.n3[RESIDUAL] and w.n6[MOVED], for `advance` to take.
     """
-    jumps, moved = w.n6[JUMPS], w.n6[MOVED]
-    b, response = w.b[0], w.b[1]
+    b, response, moved = w.b[0], w.b[1], w.n6[MOVED]
     linear, residual = w.n3[LINEAR], w.n3[RESIDUAL]
-    one, two = w.m[M_ONE], w.m[M_TWO]
-    x = w.v[X]
-    gap = w.v[GAP]
-    total = w.v[TOTAL]
-    work = w.v[WORK]
-    # Jump of each node, its derivatives by the impulse and by the node.
-    for i in range(n):
-        from_elements(nodes[i], x)
-        if not first:
-            if not element_derivatives(x, int(0), one, w.v):
-                return -1.0, np.inf
-            for j in range(3):
-                x[3 + j] += dv[i, j]
-        if not to_elements(x, jumps[i]):
-            return -1.0, np.inf
-        for j in range(6):
-            jumps[i, j] -= nodes[i, j]
-        jumps[i, 5] = wrap(jumps[i, 5])
-        if first:
-            if not element_derivatives(x, int(3), two, w.v):
-                return -1.0, np.inf
-            for j in range(6):
-                for k in range(3):
-                    response[i, j, k] = two[j, k]
-                for k in range(6):
-                    w.m[i, j, k] = 1.0 if j == k else 0.0
-        else:
-            if not element_derivatives(x, int(0), two, w.v):
-                return -1.0, np.inf
-            for j in range(6):
-                for k in range(3):
-                    response[i, j, k] = two[j, 3 + k]
-            if not divide(two, one, w.m[i]):
-                return -1.0, np.inf
-    # Condense, last node first: m = d(end)/d(elements after impulse i).
-    for j in range(6):
-        gap[j] = e1[j] - nodes[n - 1, j] - jumps[n - 1, j]
-        for k in range(6):
-            one[j, k] = 1.0 if j == k else 0.0
-    gap[5] = longitude - nodes[n - 1, 5] - jumps[n - 1, 5]
-    one[5, 0] = 0.5 * dt
-    gap[5] -= 0.5 * dt * (nodes[n - 1, 0] + jumps[n - 1, 0])
-    for i in range(n - 1, -1, -1):
-        for j in range(6):
-            for k in range(3):
-                value = 0.0
-                for q in range(6):
-                    value += one[j, q] * response[i, q, k]
-                b[i, j, k] = value
-        for j in range(6):
-            for k in range(6):
-                value = 0.0
-                for q in range(6):
-                    value += one[j, q] * w.m[i, q, k]
-                two[j, k] = value
-        # moved[i]: by how much the flow from the node before misses node i.
-        span = dt if i > 0 else 0.5 * dt
-        for j in range(6):
-            before = nodes[i - 1, j] + jumps[i - 1, j] if i > 0 else e0[j]
-            moved[i, j] = before - nodes[i, j]
-        motion = nodes[i - 1, 0] + jumps[i - 1, 0] if i > 0 else e0[0]
-        moved[i, 5] += motion * span
-        for j in range(6):
-            for k in range(6):
-                one[j, k] = two[j, k]
-                gap[j] -= one[j, k] * moved[i, k]
-            one[j, 0] += one[j, 5] * span
+    gap, total, work = w.v[GAP], w.v[TOTAL], w.v[WORK]
+    if not _linearise_nodes(nodes, dv, n, first, w):
+        return -1.0, np.inf
+    _condense(e0, e1, longitude, dt, n, nodes, w)
     for j in range(6):
         total[j] = gap[j]
         for i in range(n):
             for k in range(3):
                 total[j] += b[i, j, k] * dv[i, k]
-    if not whiten(b, n, one, w.m[LOWER]):
+    if not whiten(b, n, w.m[M_ONE], w.m[LOWER]):
         return -1.0, np.inf
     solve_lower(w.m[LOWER], total)
     if gentle:

@@ -220,6 +220,73 @@ def pursue(
     return z
 
 
+@inner_kernel
+def _best_arc(
+    x0: _Array, tof: float, c: float, n: int, bent: _Array, shapes: _Array, w: Workspace
+) -> tuple[float, int, bool]:
+    """Try one start after the other; leave the best arc in w.n3[BEST].
+
+    Returns its z, inf if there is none, the start that led to it, -1 if none, and whether it
+    is worth the second-order finish: where starts disagree, or the way is long.
+    """
+    straight = np.zeros((5, 3))
+    # Literal integers would make numba compile a kernel once for each value.
+    no_sweeps = int(0)
+    last = int(_N_TURNS)
+    first_and_gentle = int(_FIRST_SWEEPS + _GENTLE)
+    best = np.inf
+    best_start = -1
+    agreed = 0
+    for s in range(_N_TURNS):
+        if lay_path(s, turns_of(s), straight, tof, n, w):
+            bend(s, int(_FIRST_SWEEPS), no_sweeps, tof, c, n, best, w)
+        w.v[TURN_Z, s] = w.v[Z, s]
+    travel = longest_travel(w)
+    # On short legs all starts agree.
+    long = travel > _SHORT
+    # With every further turn there are more optima, and agreement says less.
+    needed = _AGREEMENT + int(_WINDING * max(travel - _TURN, 0.0))
+    n_bent = bent.shape[0] if long else 0
+    n_hops = _HOPS if long else 0
+    for attempt in range(_N_TURNS + n_bent + n_hops + shapes.shape[0]):
+        k = attempt - _N_TURNS
+        hop = k - n_bent
+        start = min(attempt, _N_TURNS + n_bent)
+        if k >= 0 and hop < n_hops and agreed >= needed:
+            continue
+        if k < 0:
+            s = leading_turn(w)
+            start = s
+            if not w.v[Z, s] < _SCREEN * best:
+                continue
+        elif 0 <= hop < n_hops:
+            s = last
+            start = _N_TURNS + bent.shape[0] + 1
+            if not (best < np.inf and lay_hop(s, x0, bent[1 + hop], tof, n, best, w)):
+                continue
+        else:
+            s = last
+            if hop >= 0:
+                start = _N_TURNS + bent.shape[0]
+            shape = bent[k] if hop < 0 else shapes[hop - n_hops]
+            if lay_path(s, turns_of(likely_turn(k, best, w)), shape, tof, n, w):
+                bend(s, first_and_gentle, int(_GENTLE), tof, c, n, best, w)
+        z = pursue(s, x0, tof, c, n, best, long, w)
+        if k < 0 and z < np.inf:
+            w.v[TURN_Z, s] = z
+        if z < best:
+            agreed = agreed + 1 if z > (1.0 - _SAME) * best else 1
+        elif z < (1.0 + _SAME) * best and not 0 <= hop < n_hops:
+            agreed += 1
+        if z < best:
+            best = z
+            best_start = start
+            for i in range(n):
+                for j in range(3):
+                    w.n3[BEST, i, j] = w.n3[DV, i, j]
+    return best, best_start, long and (agreed < needed or travel > _TURN)
+
+
 @kernel
 def maximum_batch(
     rv0: _Array,
@@ -266,68 +333,16 @@ def maximum_batch(
     frame = np.empty((3, 3))
     x0 = np.empty(6)
     x1 = np.empty(6)
-    straight = np.zeros((5, 3))
-    # Literal integers would make numba compile a kernel once for each value.
-    no_sweeps = int(0)
-    last = int(_N_TURNS)
-    first_and_gentle = int(_FIRST_SWEEPS + _GENTLE)
     for row in range(rv0.shape[0]):
         length, speed = scale_leg(rv0[row], rv1[row], mu, frame, x0, x1)
         tof = tof_s[row] * speed / length
         c = exhaust[row] / speed
         if not to_elements(x0, w.v[E0]) or not to_elements(x1, w.v[E1]):
             continue
-        best = np.inf
-        agreed = 0
-        for s in range(_N_TURNS):
-            if lay_path(s, turns_of(s), straight, tof, n, w):
-                bend(s, int(_FIRST_SWEEPS), no_sweeps, tof, c, n, best, w)
-            w.v[TURN_Z, s] = w.v[Z, s]
-        # On short legs all starts agree.
-        travel = longest_travel(w)
-        long = travel > _SHORT
-        # With every further turn there are more optima, and agreement says less.
-        needed = _AGREEMENT + int(_WINDING * max(travel - _TURN, 0.0))
-        n_bent = bent.shape[0] if long else 0
-        n_hops = _HOPS if long else 0
-        for attempt in range(_N_TURNS + n_bent + n_hops + shapes.shape[1]):
-            k = attempt - _N_TURNS
-            hop = k - n_bent
-            start = min(attempt, _N_TURNS + n_bent)
-            if k >= 0 and hop < n_hops and agreed >= needed:
-                continue
-            if k < 0:
-                s = leading_turn(w)
-                start = s
-                if not w.v[Z, s] < _SCREEN * best:
-                    continue
-            elif 0 <= hop < n_hops:
-                s = last
-                start = _N_TURNS + bent.shape[0] + 1
-                if not (best < np.inf and lay_hop(s, x0, bent[1 + hop], tof, n, best, w)):
-                    continue
-            else:
-                s = last
-                if hop >= 0:
-                    start = _N_TURNS + bent.shape[0]
-                shape = bent[k] if hop < 0 else shapes[row, hop - n_hops]
-                if lay_path(s, turns_of(likely_turn(k, best, w)), shape, tof, n, w):
-                    bend(s, first_and_gentle, int(_GENTLE), tof, c, n, best, w)
-            z = pursue(s, x0, tof, c, n, best, long, w)
-            if k < 0 and z < np.inf:
-                w.v[TURN_Z, s] = z
-            if z < best:
-                agreed = agreed + 1 if z > (1.0 - _SAME) * best else 1
-            elif z < (1.0 + _SAME) * best and not 0 <= hop < n_hops:
-                agreed += 1
-            if z < best:
-                best = z
-                winner[row] = start
-                for i in range(n):
-                    for j in range(3):
-                        w.n3[BEST, i, j] = w.n3[DV, i, j]
+        best, start, unsure = _best_arc(x0, tof, c, n, bent, shapes[row], w)
         if best < np.inf:
-            if long and (agreed < needed or travel > _TURN):
+            winner[row] = start
+            if unsure:
                 polish(x0, w.n3[BEST], n, n // 2, tof / n, c, w.v[E1], w)
             close(x0, w.n3[BEST], n, tof / n, w.v[E1], 1e-12, int(4), w)
             z_out[row] = z_of_impulses(w.n3[BEST], n, n // 2, c)

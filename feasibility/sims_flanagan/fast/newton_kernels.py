@@ -226,6 +226,144 @@ def _curvature(
 
 
 @inner_kernel
+def _directions(dv: _Array, n: int, u: _Array) -> None:
+    """Write the unit vectors along the impulses."""
+    for i in range(n):
+        length = 1e-300
+        for j in range(3):
+            length += dv[i, j] ** 2
+        for j in range(3):
+            u[i, j] = dv[i, j] / math.sqrt(length)
+
+
+@inner_kernel
+def _responses(n: int, c: float, pull: _Array, table: _Array, w: Workspace) -> None:
+    """Write how the end moves with z, `pull`, and with turns, right of the Hessian in `table`."""
+    u, y, slope, b = w.n3[_U], w.s[Y], w.s[SLOPE], w.b[0]
+    size = 2 * n
+    for q in range(6):
+        pull[q] = 0.0
+    for i in range(n):
+        _tangents(u[i], w.n3[_FIRST, i], w.n3[_SECOND, i])
+        for q in range(6):
+            t0 = t1 = along = 0.0
+            for j in range(3):
+                along += b[i, q, j] * u[i, j]
+                t0 += b[i, q, j] * w.n3[_FIRST, i, j]
+                t1 += b[i, q, j] * w.n3[_SECOND, i, j]
+            pull[q] += c * slope[i] * along
+            table[2 * i, size + q] = c * y[i] * t0
+            table[2 * i + 1, size + q] = c * y[i] * t1
+
+
+@inner_kernel
+def _multipliers(n: int, c: float, pull: _Array, table: _Array, w: Workspace) -> float:
+    """Write the multipliers, w.v[LAM], and primers by least squares across the thrust.
+
+    The multipliers before whitening go to w.v[TRIAL_LAM]. Returns the mean of the primers,
+    weighted with the impulses; 0 where there are no multipliers.
+    """
+    lam, lam_end, primer, b = w.v[LAM], w.v[TRIAL_LAM], w.n3[_PRIMER], w.b[0]
+    gram, lower = w.m[HESSIAN], w.m[HESSIAN_LOWER]
+    for q in range(6):
+        lam[q] = pull[q]
+    if not _stiffness(table, 2 * n, int(0), pull, gram, lower) > 0.0:
+        return 0.0
+    solve_lower(lower, lam)
+    solve_lower_transposed(lower, lam)
+    total = 0.0
+    for q in range(6):
+        total += pull[q] * lam[q]
+    for q in range(6):
+        lam[q] /= -total
+        lam_end[q] = lam[q]
+    solve_lower_transposed(w.m[LOWER], lam_end)
+    mean = 0.0
+    for i in range(n):
+        long = 0.0
+        for j in range(3):
+            total = 0.0
+            for q in range(6):
+                total += b[i, q, j] * lam[q]
+            primer[i, j] = total
+            long += total * total
+        mean += c * w.s[Y, i] * math.sqrt(long) / n
+    return mean
+
+
+@inner_kernel
+def _stiffen(table: _Array, size: int, mean: float) -> None:
+    """Add to the Hessian what asks positive definite only of turns that keep the end."""
+    total = 0.0
+    for row in range(size):
+        for q in range(6):
+            total += table[row, size + q] ** 2
+    stiff = _STIFF * mean * size / total
+    for row in range(size):
+        for col in range(row + 1):
+            total = 0.0
+            for q in range(6):
+                total += table[row, size + q] * table[col, size + q]
+            table[row, col] += stiff * total
+
+
+@inner_kernel
+def _newton_step(
+    ease: float, pull: _Array, gap: _Array, rise: _Array, lam: _Array, lower: _Array
+) -> float:
+    """Return the step of z; write that of the multipliers to `lam`. `rise` is overwritten."""
+    for q in range(6):
+        rise[q] = pull[q]
+        lam[q] = gap[q]
+    solve_lower(lower, rise)
+    solve_lower_transposed(lower, rise)
+    solve_lower(lower, lam)
+    solve_lower_transposed(lower, lam)
+    along = 0.0
+    total = 1.0
+    for q in range(6):
+        along += pull[q] * rise[q]
+        total += pull[q] * lam[q]
+    dz = ease - total / along
+    for q in range(6):
+        lam[q] += (dz - ease) * rise[q]
+    return dz
+
+
+@inner_kernel
+def _close_again(
+    x0: _Array,
+    n: int,
+    n_forward: int,
+    dt: float,
+    c: float,
+    target: _Array,
+    z: float,
+    ease: float,
+    pull: _Array,
+    table: _Array,
+    w: Workspace,
+) -> float:
+    """Close the arc of the turned directions by steps of the same metric; return its z or inf."""
+    trial, arc, gap, lower = w.n3[_TRIAL_U], w.n3[_ARC], w.v[TRIAL_GAP], w.m[HESSIAN_LOWER]
+    before = np.inf
+    for _ in range(_CORRECTIONS):
+        _thrust(trial, z, n, n_forward, c, arc, w)
+        miss = whitened_gap(x0, arc, n, dt, target, w, gap)
+        if miss < _CLOSED:
+            return z
+        if not miss < 0.5 * before:
+            break
+        before = miss
+        solve_lower(lower, gap)
+        solve_lower_transposed(lower, gap)
+        _turn(table, gap, n, trial, trial, w)
+        for q in range(6):
+            z -= ease * pull[q] * gap[q]
+    return np.inf
+
+
+@inner_kernel
 def polish(
     x0: _Array,
     dv: _Array,
@@ -244,122 +382,39 @@ def polish(
     """
     size = 2 * n
     table = np.empty((2 * size, size + 6))
-    u, trial, arc, primer = w.n3[_U], w.n3[_TRIAL_U], w.n3[_ARC], w.n3[_PRIMER]
-    y, slope, b = w.s[Y], w.s[SLOPE], w.b[0]
-    gap, trial_gap, lam, lam_end = w.v[GAP], w.v[TRIAL_GAP], w.v[LAM], w.v[TRIAL_LAM]
-    pull, rise = w.v[TOTAL], w.v[STEP]
+    u, trial, arc = w.n3[_U], w.n3[_TRIAL_U], w.n3[_ARC]
+    gap, lam, pull, rise = w.v[GAP], w.v[LAM], w.v[TOTAL], w.v[STEP]
     gram, lower = w.m[HESSIAN], w.m[HESSIAN_LOWER]
-    z0 = z_of_impulses(dv, n, n_forward, c)
-    z = z0
-    for i in range(n):
-        length = 1e-300
-        for j in range(3):
-            length += dv[i, j] ** 2
-        for j in range(3):
-            u[i, j] = dv[i, j] / math.sqrt(length)
+    z = z_of_impulses(dv, n, n_forward, c)
+    _directions(dv, n, u)
     bound = _LARGEST_RISE * z
-    best = z0
+    best = z
     damping = 0.0
     for _ in range(_ITERATIONS):
         _thrust(u, z, n, n_forward, c, arc, w)
         if not linearise(x0, arc, n, dt, target, w, gap) < np.inf:
             break
-        for q in range(6):
-            pull[q] = 0.0
-        for i in range(n):
-            _tangents(u[i], w.n3[_FIRST, i], w.n3[_SECOND, i])
-            for q in range(6):
-                t0 = t1 = along = 0.0
-                for j in range(3):
-                    along += b[i, q, j] * u[i, j]
-                    t0 += b[i, q, j] * w.n3[_FIRST, i, j]
-                    t1 += b[i, q, j] * w.n3[_SECOND, i, j]
-                pull[q] += c * slope[i] * along
-                table[2 * i, size + q] = c * y[i] * t0
-                table[2 * i + 1, size + q] = c * y[i] * t1
-        # Multipliers by least squares on the primers' components across the thrust.
-        for q in range(6):
-            lam[q] = pull[q]
-        if not _stiffness(table, size, int(0), pull, gram, lower) > 0.0:
+        _responses(n, c, pull, table, w)
+        mean = _multipliers(n, c, pull, table, w)
+        if not mean > 0.0 or not _curvature(x0, n, dt, c, w.v[TRIAL_LAM], table, w):
             break
-        solve_lower(lower, lam)
-        solve_lower_transposed(lower, lam)
-        total = 0.0
-        for q in range(6):
-            total += pull[q] * lam[q]
-        for q in range(6):
-            lam[q] /= -total
-            lam_end[q] = lam[q]
-        solve_lower_transposed(w.m[LOWER], lam_end)
-        mean = 0.0
-        for i in range(n):
-            long = 0.0
-            for j in range(3):
-                total = 0.0
-                for q in range(6):
-                    total += b[i, q, j] * lam[q]
-                primer[i, j] = total
-                long += total * total
-            mean += c * y[i] * math.sqrt(long) / n
-        if not _curvature(x0, n, dt, c, lam_end, table, w):
-            break
-        # Positive definite is asked of turns that keep the end only: the others are stiffened.
-        total = 0.0
-        for row in range(size):
-            for q in range(6):
-                total += table[row, size + q] ** 2
-        stiff = _STIFF * mean * size / total
-        for row in range(size):
-            for col in range(row + 1):
-                total = 0.0
-                for q in range(6):
-                    total += table[row, size + q] * table[col, size + q]
-                table[row, col] += stiff * total
-        accepted = False
+        _stiffen(table, size, mean)
+        new_z = np.inf
         for _ in range(_DAMPINGS):
             if factor(table, size, damping * mean):
                 solve_columns(table, size)
                 ease = _stiffness(table, size, size, pull, gram, lower)
                 if not ease > 0.0:
                     break
-                for q in range(6):
-                    rise[q] = pull[q]
-                    lam[q] = gap[q]
-                solve_lower(lower, rise)
-                solve_lower_transposed(lower, rise)
-                solve_lower(lower, lam)
-                solve_lower_transposed(lower, lam)
-                along = 0.0
-                total = 1.0
-                for q in range(6):
-                    along += pull[q] * rise[q]
-                    total += pull[q] * lam[q]
-                dz = ease - total / along
-                for q in range(6):
-                    lam[q] += (dz - ease) * rise[q]
-                new_z = z + dz
+                dz = _newton_step(ease, pull, gap, rise, lam, lower)
                 if abs(dz) < 0.3 * z and _turn(table, lam, n, u, trial, w) < _LARGEST_TURN:
-                    closed = False
-                    before = np.inf
-                    for _ in range(_CORRECTIONS):
-                        _thrust(trial, new_z, n, n_forward, c, arc, w)
-                        miss = whitened_gap(x0, arc, n, dt, target, w, trial_gap)
-                        if miss < _CLOSED:
-                            closed = True
-                            break
-                        if not miss < 0.5 * before:
-                            break
-                        before = miss
-                        solve_lower(lower, trial_gap)
-                        solve_lower_transposed(lower, trial_gap)
-                        _turn(table, trial_gap, n, trial, trial, w)
-                        for q in range(6):
-                            new_z -= ease * pull[q] * trial_gap[q]
-                    if closed and new_z < bound:
-                        accepted = True
+                    new_z = _close_again(
+                        x0, n, n_forward, dt, c, target, z + dz, ease, pull, table, w
+                    )
+                    if new_z < bound:
                         break
             damping = max(2.5 * damping, _FIRST_DAMPING)
-        if not accepted:
+        if not new_z < bound:
             break
         gain = bound / new_z - 1.0
         z = new_z

@@ -5,6 +5,7 @@ To write one of your own, give a class the method of `Ranking`, test an object w
 """
 
 from seqsearch.beam.rankings.balanced import BalancedRanking
+from seqsearch.beam.rankings.check import RankingContractError, check_ranking
 from seqsearch.beam.rankings.make import make_ranking
 from seqsearch.beam.rankings.pareto import ParetoRanking
 from seqsearch.beam.rankings.potential import PotentialRanking
@@ -16,6 +17,8 @@ __all__ = [
     "ParetoRanking",
     "PotentialRanking",
     "Ranking",
+    "RankingContractError",
     "TimePropellantRanking",
+    "check_ranking",
     "make_ranking",
 ]

@@ -1,8 +1,4 @@
-"""What a predictor expects of launches, self-fly-bys and transfers from one node.
-
-Questions that only shape and order the hops go to the predictor's quick
-answers, a few percent off; one good answer for each hop corrects them.
-"""
+"""What a predictor expects of launches, self-fly-bys and transfers from one node."""
 
 from collections.abc import Callable
 from typing import Final, final
@@ -12,13 +8,13 @@ from numpy.typing import NDArray
 
 from feasibility import Legs
 from feasibility.classifier.predictor import LegPredictor
-from seqsearch.core.hop_margins import quick_margin_of
-from seqsearch.core.margin_curves import MarginCurves, flight_times
-from seqsearch.problems.gtoc5.directions import even_directions
-from seqsearch.problems.gtoc5.lambert_departure import lambert_departure
+from seqsearch.core.margin_curves import MarginCurves
 from seqsearch.problems.gtoc5.leg_maker import LegMaker
 from seqsearch.problems.gtoc5.self_fly_by import shortest_self_fly_by_days
 from seqsearch.problems.gtoc5.transfer_plans import TransferPlans
+from seqsearch.problems.moves.directions import even_directions
+from seqsearch.problems.moves.lambert_departure import lambert_departure
+from seqsearch.problems.moves.questions import Questions
 from seqsearch.settings import SearchSettings
 
 _Array = NDArray[np.float64]
@@ -51,9 +47,6 @@ _FINALISTS: Final = 3
 _LEVELS: Final = (0.02, 0.12, 0.3, 0.55, 0.85)
 """log(m*/m0) of the flights to a target: the shortest, and longer ones that save propellant."""
 
-_NOWHERE: Final = -5.0
-"""log(m*/m0) of legs of which nothing is known."""
-
 
 @final
 class Gtoc5Forecast:
@@ -70,11 +63,6 @@ class Gtoc5Forecast:
     settings : SearchSettings
         `neighbours`: bodies looked at, the nearest in the space of the elements;
         `tof_days_min` and `tof_days_max`, of transfers alone.
-
-    Attributes
-    ----------
-    questions : int
-        Legs that the predictor was asked about so far.
     """
 
     def __init__(
@@ -85,12 +73,15 @@ class Gtoc5Forecast:
         settings: SearchSettings,
     ) -> None:
         self._maker = maker
-        self._predictor = predictor
-        self._quick = quick_margin_of(predictor)
+        self._ask = Questions(predictor)
         self._settings = settings
-        self.questions = 0
         self._points = points
         self._directions = even_directions(_DIRECTIONS)
+
+    @property
+    def questions(self) -> int:
+        """Legs that the predictor was asked about so far."""
+        return self._ask.count
 
     def launches(self, row: int, t: float, mass: float) -> TransferPlans | None:
         """Return transfers from the Earth to first asteroids, launched along Lambert's arc.
@@ -200,7 +191,7 @@ class Gtoc5Forecast:
             np.tile(tof, n),
             np.full(n * len(tof), mass),
         )
-        reserve = self._log_margin(legs).reshape(n, len(tof)) - np.log(FLY_BY_STRETCH)
+        reserve = self._ask.quick_log_margin(legs).reshape(n, len(tof)) - np.log(FLY_BY_STRETCH)
         return np.tile([_crossing(tof, line) for line in reserve], 2)
 
     def _launch_velocity(self, row: int, t: float, target: _Rows, tof: _Array) -> _Array:
@@ -241,9 +232,7 @@ class Gtoc5Forecast:
         """Return the margin of each pair over the flight time, by quick answers."""
         first = np.full(len(pair), self._settings.tof_days_min)
         last = np.full(len(pair), self._settings.tof_days_max)
-        tof = flight_times(first, last, _KNOTS)
-        values = self._log_margin(legs(np.repeat(pair, _KNOTS), tof.ravel()))
-        return MarginCurves.through(first, last, values.reshape(tof.shape))
+        return self._ask.curves(pair, first, last, _KNOTS, legs)
 
     def _directions_for(
         self, row: int, t: float, target: _Rows, tof: _Array, mass: float, wait: _Array
@@ -260,7 +249,7 @@ class Gtoc5Forecast:
             np.repeat(tof, d),
             mass,
         )
-        log_margin = self._log_margin(legs).reshape(n, d)
+        log_margin = self._ask.quick_log_margin(legs).reshape(n, d)
         arrival = wait[open_] + tof[:, None] * np.exp(-log_margin / _TIME_EXPONENT)
         order = np.argsort(arrival, axis=1, kind="stable")[:, :_FINALISTS]
         # Fewer open directions than finalists: the best one stands in for the missing.
@@ -277,18 +266,10 @@ class Gtoc5Forecast:
         if len(known) == 0:
             return None
         curves, shortest = curves.take(known), shortest[known]
-        self.questions += len(known)
-        with np.errstate(invalid="ignore", divide="ignore"):
-            answer = np.log(self._predictor.margin(legs(known, shortest)))
-        curves = curves.corrected(shortest, answer)
+        curves = self._ask.corrected(curves, shortest, legs(known, shortest))
         times = np.column_stack([curves.shortest(level) for level in _LEVELS])
         k, level = np.nonzero(np.isfinite(times))
         return (known[k], times[k, level]) if len(k) else None
-
-    def _log_margin(self, legs: Legs) -> _Array:
-        self.questions += len(legs)
-        with np.errstate(invalid="ignore", divide="ignore"):
-            return np.nan_to_num(np.log(self._quick(legs)), nan=_NOWHERE, neginf=_NOWHERE)
 
 
 def _earliest(times: _Array, count: int) -> _Rows:

@@ -10,6 +10,7 @@ from feasibility import Legs, Spacecraft
 from feasibility.orbits import Catalogue
 from seqsearch.problems.gtoc5.rules import Gtoc5Rules
 from seqsearch.problems.gtoc5.self_fly_by import self_fly_by_delta_v
+from seqsearch.problems.moves.legs_between import legs_between
 
 _Array = NDArray[np.float64]
 _Rows = NDArray[np.intp]
@@ -89,11 +90,16 @@ class LegMaker:
         mass : (n,) float64, kg
             At departure.
         """
-        left = self.catalogue.states_at(row, t_mjd2000)
-        left[:, 3:] += velocity
-        reached = self.catalogue.states_at(target, t_mjd2000 + tof_days)
-        return self._legs(
-            left, reached, tof_days, mass, self.least_mass_at_rendezvous, t_mjd2000, row, target
+        return legs_between(
+            self.catalogue,
+            self.spacecraft,
+            row,
+            target,
+            t_mjd2000,
+            tof_days,
+            mass,
+            least_mass=self.least_mass_at_rendezvous,
+            departure_velocity=velocity,
         )
 
     def self_fly_bys(
@@ -112,32 +118,14 @@ class LegMaker:
         mass : (n,) float64, kg
             At departure.
         """
-        left = self.catalogue.states_at(row, t_mjd2000)
-        passed = self.catalogue.states_at(row, t_mjd2000 + tof_days)
-        passed[:, 3:] += velocity
-        dry = self.spacecraft.m_dry + self.rules.penetrator_kg
-        return self._legs(left, passed, tof_days, mass, dry, t_mjd2000, row, row)
-
-    def _legs(
-        self,
-        left: _Array,
-        reached: _Array,
-        tof_days: _Array,
-        mass: _Array,
-        least_mass: float,
-        t_mjd2000: _Array,
-        row: _Rows,
-        target: _Rows,
-    ) -> Legs:
-        return Legs(
-            rv_dep=left,
-            rv_arr=reached,
-            tof_days=tof_days,
-            m0=np.maximum(mass, least_mass),
-            thrust=self.spacecraft.thrust,
-            isp=self.spacecraft.isp,
-            m_dry=least_mass,
-            t_dep_mjd2000=t_mjd2000,
-            dep_id=self.catalogue.ids[row],
-            arr_id=self.catalogue.ids[target],
+        return legs_between(
+            self.catalogue,
+            self.spacecraft,
+            row,
+            row,
+            t_mjd2000,
+            tof_days,
+            mass,
+            least_mass=self.spacecraft.m_dry + self.rules.penetrator_kg,
+            arrival_velocity=velocity,
         )

@@ -20,14 +20,14 @@ from seqsearch.core.mission import days_until_end, not_visited
 from seqsearch.core.nodes import Nodes
 from seqsearch.core.recording import tour_body
 from seqsearch.core.tree import FlownLeg
-from seqsearch.problems.gtoc5.directions import even_directions
 from seqsearch.problems.gtoc5.element_distance import phase_free_points
 from seqsearch.problems.gtoc5.forecast import FLY_BY_STRETCH, Gtoc5Forecast
-from seqsearch.problems.gtoc5.lambert_departure import lambert_departure
 from seqsearch.problems.gtoc5.leg_maker import LegMaker
 from seqsearch.problems.gtoc5.rules import Gtoc5Rules
 from seqsearch.problems.gtoc5.self_fly_by import shortest_self_fly_by_days
 from seqsearch.problems.gtoc5.transfer_plans import TransferPlans
+from seqsearch.problems.moves.directions import even_directions
+from seqsearch.problems.moves.lambert_departure import lambert_departure
 from seqsearch.problems.rendezvous import RendezvousProblem
 from seqsearch.settings import SearchSettings
 from seqsearch.tours.tour import TourRules

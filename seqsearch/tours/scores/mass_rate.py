@@ -1,13 +1,11 @@
 """`MassRate`: final mass over flight time, for tours that are complete."""
 
-from typing import ClassVar, Final, final
+from typing import ClassVar, final
 
 import msgspec
 
+from feasibility.constants import YEAR_DAYS
 from seqsearch.tours.records import TourBody, TourLeg
-
-_YEAR_DAYS: Final = 365.25
-"""Julian year."""
 
 
 @final
@@ -36,5 +34,5 @@ class MassRate(
         """Return the rate."""
         if len(visits) < self.visits or not legs:
             return 0.0
-        years = (legs[-1].t_arr_mjd2000 - legs[0].t_dep_mjd2000) / _YEAR_DAYS
+        years = (legs[-1].t_arr_mjd2000 - legs[0].t_dep_mjd2000) / YEAR_DAYS
         return (legs[-1].m_final_kg - legs[-1].dropped_kg) / years

@@ -44,7 +44,7 @@ def test_a_run_writes_its_folder_and_verifies(run_folder, capsys):
     names = {path.name for path in run_folder.iterdir()}
     assert names == {
         "config.toml", "provenance.json", "counters.csv", "sequence.json", "sequence.csv",
-        "tour.png", "audit.json", "checkpoints",
+        "tour.png", "audit.json", "checkpoints", "sequence.search.json", ".lock",
     }  # fmt: skip
     assert tomllib.loads((run_folder / "config.toml").read_text())["search"]["beam_width"] == 3
     provenance = json.loads((run_folder / "provenance.json").read_text())
@@ -156,7 +156,7 @@ def test_durations(text, seconds):
     assert parse_duration(text) == seconds
 
 
-def test_ctrl_c_ends_with_a_tour_and_exit_code_0(tmp_path, problem_file):
+def test_ctrl_c_ends_with_a_tour_and_exit_code_130(tmp_path, problem_file):
     out = tmp_path / "run"
     text = problem_file.read_text().replace("starts = 6", "starts = 6\npasses = 10000")
     problem_file.write_text(text)
@@ -169,6 +169,6 @@ def test_ctrl_c_ends_with_a_tour_and_exit_code_0(tmp_path, problem_file):
             break
     os.killpg(process.pid, signal.SIGINT)
     rest = process.stdout.read()
-    assert process.wait(timeout=60) == 0
+    assert process.wait(timeout=60) == 130
     assert "search interrupted" in rest
     assert main(["verify", str(out)]) == 0

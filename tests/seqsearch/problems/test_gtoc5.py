@@ -6,63 +6,30 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from feasibility import FeasibilityClassifier, InputError, Spacecraft
+from feasibility import FeasibilityClassifier, InputError
 from feasibility.constants import AU, DAY_S, EARTH_VELOCITY, mjd_to_mjd2000
 from feasibility.orbits import Catalogue
 from feasibility.orbits.lambert import lambert
 from feasibility.sims_flanagan import solve_max_initial_mass
-from seqsearch import RendezvousProblem, SearchSettings, search, verify_tour
+from seqsearch import SearchSettings, search, verify_tour
 from seqsearch.commands.cli import main
 from seqsearch.core.custom_moves import CustomMoves
 from seqsearch.core.nodes import Nodes
 from seqsearch.core.optimisation import solve_hops
 from seqsearch.core.problem import Problem
-from seqsearch.problems.gtoc5.directions import even_directions
 from seqsearch.problems.gtoc5.element_distance import phase_free_points
 from seqsearch.problems.gtoc5.forecast import FLY_BY_STRETCH, Gtoc5Forecast
-from seqsearch.problems.gtoc5.lambert_departure import lambert_departure
 from seqsearch.problems.gtoc5.problem import Gtoc5Problem
 from seqsearch.problems.gtoc5.rules import Gtoc5Rules
 from seqsearch.problems.gtoc5.self_fly_by import self_fly_by_delta_v, shortest_self_fly_by_days
+from seqsearch.problems.moves.directions import even_directions
+from seqsearch.problems.moves.lambert_departure import lambert_departure
 from seqsearch.problems.problem_file import build_problem, read_config, to_toml, with_catalogue
 from seqsearch.settings import SearchSettings as Settings
 from seqsearch.tours.tour_files import read_tour, to_csv, to_json
+from tests.helpers.gtoc5 import near_earth_bodies, toy_problem
 
 GTOC5_TABLE = "gtoc/official/GTOC5-DATA.txt"
-
-
-def near_earth_bodies(n=60):
-    """Return bodies on orbits like the Earth's, a little apart in every element."""
-    rng = np.random.default_rng(11)
-    angles = rng.uniform(0.0, 2 * np.pi, (n, 3))
-    elements = np.column_stack(
-        [
-            AU * rng.uniform(0.97, 1.06, n),
-            rng.uniform(0.0, 0.06, n),
-            np.radians(rng.uniform(0.0, 1.5, n)),
-            angles,
-        ]
-    )
-    return Catalogue(
-        ids=np.arange(1, n + 1),
-        names=[f"body {k}" for k in range(1, n + 1)],
-        epoch_mjd2000=8000.0,
-        elements=elements,
-        source="near the Earth",
-    )
-
-
-def toy_problem(**changes):
-    values = {
-        "name": "toy",
-        "catalogue": near_earth_bodies(),
-        "spacecraft": Spacecraft(m_dry=500.0, thrust=0.3, isp=3000.0),
-        "m0": 1200.0,
-        "first_departure_mjd2000": (mjd_to_mjd2000(59000.0), mjd_to_mjd2000(60000.0)),
-        "max_duration_days": 900.0,
-        "min_stay_days": 0.0,
-    }
-    return Gtoc5Problem(base=RendezvousProblem(**(values | changes)), rules=Gtoc5Rules())
 
 
 @pytest.fixture(scope="module")

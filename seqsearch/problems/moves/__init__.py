@@ -1,0 +1,1 @@
+"""Pieces from which problems make moves of their own."""
