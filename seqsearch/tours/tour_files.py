@@ -161,8 +161,10 @@ def _upgraded(record: Any) -> Any:
     Raises
     ------
     InputError
-        Its rules have a table that no installed package can turn into events.
+        It has no body, or its rules have a table that no installed package can turn into events.
     """
+    if not record["bodies"]:
+        raise InputError(f"of format {FORMAT_1} and without a body")
     known = {field.name for field in msgspec.structs.fields(TourRules)}
     rules = record["rules"]
     own = {name: table for name, table in rules.items() if name not in known and table is not None}

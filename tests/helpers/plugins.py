@@ -27,7 +27,7 @@ RULES = PilgrimageRules
 def build(base, rules):
     from pilgrimage.problem import Pilgrimage
 
-    return Pilgrimage(base, rules)
+    return Pilgrimage(base=base, rules=rules)
 '''
 
 PROBLEM = '''
@@ -36,20 +36,15 @@ from typing import ClassVar
 
 import msgspec
 
+from seqsearch.problems.variant import RendezvousVariant
 from seqsearch.tours.checks import Check
 
 
-@dataclass(frozen=True, eq=False)
-class Pilgrimage:
-    """A tour of rendezvous in ascending order of the ids; all else is as in `base`."""
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Pilgrimage(RendezvousVariant):
+    """A tour of rendezvous in ascending order of the ids."""
 
-    base: object
     rules: object
-
-    def __getattr__(self, name):
-        if name.startswith("__"):
-            raise AttributeError(name)
-        return getattr(self.base, name)
 
     def may_visit(self, nodes, target, /):
         ids = self.base.catalogue.ids
