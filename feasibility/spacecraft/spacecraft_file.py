@@ -29,7 +29,7 @@ search_share = 0.5            # of the legs: near neighbours with flights of tof
                               # search asks about; the others: random pairs with flights of
                               # tof_ratio times the cheapest impulsive one, as in Table 1
 tof_days = [40.0, 500.0]
-neighbours = 60               # targets are among so many nearest bodies
+neighbours = 60               # targets are among this many nearest bodies
 tof_ratio = [0.6, 2.4]
 tof_days_max = 1460.0
 boundary_share = 0.5          # of the legs: mass drawn again near the heaviest possible
