@@ -1,5 +1,7 @@
 """Tours as people meet them: short texts, tables with dates, records for pandas."""
 
+import importlib.util
+
 import numpy as np
 import pytest
 
@@ -36,11 +38,11 @@ def test_records_have_one_row_a_leg(result):
     found = rows(result.tour)
     assert [row["to_id"] for row in found] == [body.id for body in result.tour.bodies[1:]]
     assert sum(row["tof_days"] for row in found) <= result.tour.duration_days
-    try:
-        frame = result.tour.to_dataframe()
-    except MissingDependencyError as error:
-        assert "pandas" in str(error)
+    if importlib.util.find_spec("pandas") is None:
+        with pytest.raises(MissingDependencyError, match="pandas"):
+            result.tour.to_dataframe()
     else:
+        frame = result.tour.to_dataframe()
         assert list(frame["leg"]) == list(range(1, len(found) + 1))
 
 
