@@ -7,7 +7,7 @@ that has the rules. Importing the package should cost little: all plug-ins are i
 a problem file is read.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cache
 from importlib import metadata, resources
@@ -59,11 +59,13 @@ def plugins() -> dict[str, ProblemPlugin]:
         A plug-in cannot be imported, has rules and no way to build a problem or the other way
         round, rules that are no struct, or a name that occurs twice or cannot be that of a table.
     """
+    # The same entry may be there twice: of an installation and of a source tree beside it.
+    entries = {(entry.name, entry.value): entry for entry in _entries()}
     found: dict[str, ProblemPlugin] = {}
-    for entry in sorted(metadata.entry_points(group=ENTRY_POINTS), key=lambda entry: entry.name):
-        if entry.name in found:
-            raise InputError(f"problem plug-in {entry.name}: two installed packages bring one")
-        found[entry.name] = _loaded(entry)
+    for (name, _), entry in sorted(entries.items()):
+        if name in found:
+            raise InputError(f"problem plug-in {name}: two installed packages bring one")
+        found[name] = _loaded(entry)
     return found
 
 
@@ -82,6 +84,10 @@ def builtin_problems() -> dict[str, str]:
                 raise InputError(f"problem {name}: two installed plug-ins have one")
             texts[name] = text
     return dict(sorted(texts.items()))
+
+
+def _entries() -> Iterable[metadata.EntryPoint]:
+    return metadata.entry_points(group=ENTRY_POINTS)
 
 
 def _loaded(entry: metadata.EntryPoint) -> ProblemPlugin:
