@@ -7,7 +7,7 @@ that has the rules. Importing the package should cost little: all plug-ins are i
 a problem file is read.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from importlib import metadata, resources
@@ -60,7 +60,8 @@ def plugins() -> dict[str, ProblemPlugin]:
         round, rules that are no struct, or a name that occurs twice or cannot be that of a table.
     """
     # The same entry may be there twice: of an installation and of a source tree beside it.
-    entries = {(entry.name, entry.value): entry for entry in _entries()}
+    group = metadata.entry_points(group=ENTRY_POINTS)
+    entries = {(entry.name, entry.value): entry for entry in group}
     found: dict[str, ProblemPlugin] = {}
     for (name, _), entry in sorted(entries.items()):
         if name in found:
@@ -84,10 +85,6 @@ def builtin_problems() -> dict[str, str]:
                 raise InputError(f"problem {name}: two installed plug-ins have one")
             texts[name] = text
     return dict(sorted(texts.items()))
-
-
-def _entries() -> Iterable[metadata.EntryPoint]:
-    return metadata.entry_points(group=ENTRY_POINTS)
 
 
 def _loaded(entry: metadata.EntryPoint) -> ProblemPlugin:
