@@ -68,3 +68,8 @@ def __getattr__(name: str) -> object:
     if name in _HOMES:
         return getattr(importlib.import_module(_HOMES[name]), name)
     raise AttributeError(f"module 'feasibility' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    """Also name what is not loaded yet, for completion in a console."""
+    return sorted({*globals(), *__all__})

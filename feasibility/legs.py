@@ -39,12 +39,12 @@ class Spacecraft:
     Raises
     ------
     InputError
-        A value is not finite, not positive, or evidently in another unit.
+        A value is no number, not finite, not positive, or evidently in another unit.
 
     Examples
     --------
-    >>> gtoc7_probe = Spacecraft(m_dry=800.0, thrust=0.3, isp=3000.0)
-    >>> round(gtoc7_probe.exhaust_velocity)
+    >>> probe = Spacecraft(m_dry=800.0, thrust=0.3, isp=3000.0)
+    >>> round(probe.exhaust_velocity)
     29420
     """
 
@@ -54,7 +54,10 @@ class Spacecraft:
 
     def __post_init__(self) -> None:
         for name in ("m_dry", "thrust", "isp"):
-            value = np.asarray(getattr(self, name), dtype=float)
+            try:
+                value = np.asarray(getattr(self, name), dtype=float)
+            except (TypeError, ValueError) as error:
+                raise InputError(f"Spacecraft {name}: expected a number ({error})") from None
             if value.ndim:
                 raise InputError(
                     f"Spacecraft {name}: expected one number, got shape {value.shape}"
@@ -310,8 +313,9 @@ def _broadcast(name: str, array: NDArray[Any], n: int) -> NDArray[Any]:
 def _check_finite(label: str, column: NDArray[np.float64]) -> None:
     bad = ~np.isfinite(column)
     if bad.any():
-        row = int(np.argmax(bad if bad.ndim == 1 else bad.any(axis=1)))
-        raise InputError(f"{label}, row {row}: {column[row]} is not finite")
+        row, *component = (int(index) for index in np.argwhere(bad)[0])
+        where = f", component {component[0]}" if component else ""
+        raise InputError(f"{label}, row {row}{where}: {column[row, *component]} is not finite")
 
 
 # What a value beyond these limits usually is: (limit, unit that was probably meant).

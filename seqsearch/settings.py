@@ -123,7 +123,8 @@ class SearchSettings(_Table, frozen=True, kw_only=True):
     departure_delays_days : tuple of float
         Waits beyond the shortest stay that are tried.
     pruner : str
-        Pruners with an optional parameter, asked in turn, such as
+        Pruners with an optional parameter, asked in turn: ``"default:0.99"``, the classifier
+        that comes with the package at this recall, or others, such as
         ``"lambert:1.3,mima2:0.97"``; ``"none"`` keeps all.
     solver : str
         Leg solver for the full optimisation: ``"fast"`` or ``"reference"``.
@@ -162,7 +163,7 @@ class SearchSettings(_Table, frozen=True, kw_only=True):
     flight_time_stretches: tuple[Annotated[float, Meta(ge=1)], ...] = (1.0, 1.06, 1.14, 1.25, 1.4)
     margin_reserve: Annotated[float, Meta(ge=0)] = 0.002
     departure_delays_days: tuple[Annotated[float, Meta(ge=0)], ...] = (0.0,)
-    pruner: str = "lambert:1.3,mima2:0.97"
+    pruner: str = "default:0.99"
     solver: str = "fast"
     solves_per_rank: _Count = 8000
     flyable_per_target: _Count = 2

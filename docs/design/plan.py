@@ -27,8 +27,8 @@ FLOORS = {
         {"sims_flanagan": "leg solvers: fast/ and reference/"},
         {"orbits": "Kepler, elements, Lambert, MIMA, catalogues, neighbours"},
         {"legs": "Legs and Spacecraft, the one thing that all parts exchange"},
-        {"arrays": "structs of arrays", "runtime": "files, processes, kernels, pykep"},
-        {"constants": "units", "errors": "InputError and others"},
+        {"runtime": "files, processes, kernels, TOML, the guarded import of pykep"},
+        {"constants": "units", "errors": "InputError", "arrays": "structs of arrays"},
     ],
 }
 """Rooms by floor, the highest first. A room knows those on the floors below it."""

@@ -17,7 +17,8 @@ from feasibility.commands import (
 )
 from feasibility.commands.options import CommandParser
 from feasibility.errors import InputError, MissingDependencyError
-from feasibility.runtime.interrupts import end_output, interrupt_code, interruptible
+from feasibility.runtime.interrupts import interrupt_code, interruptible
+from feasibility.runtime.terminal import end_output
 from feasibility.sims_flanagan.fast.compilation import prefer_fast_compilation
 
 _DESCRIPTION: Final = """\

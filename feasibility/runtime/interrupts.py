@@ -1,11 +1,9 @@
-"""Signals and pipes of a program: it ends once, tidily, and says how by its exit code."""
+"""Signals of a program: it ends once, tidily, and says how by its exit code."""
 
-import os
 import signal
-import sys
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from types import FrameType
 from typing import Final
 
@@ -40,28 +38,6 @@ def interruptible() -> Iterator[None]:
 def interrupt_code() -> int:
     """Return the exit code that tells of the signal that was received, 0 for none."""
     return _CODES[signal.Signals(_received[0])] if _received else 0
-
-
-def say(text: str = "") -> None:
-    """Print a line; where nobody reads it any more, go on without printing."""
-    try:
-        print(text, flush=True)
-    except BrokenPipeError:
-        _close_stdout()
-
-
-def end_output() -> None:
-    """Write out what was printed; quietly where nobody reads it any more."""
-    try:
-        sys.stdout.flush()
-    except BrokenPipeError:
-        _close_stdout()
-
-
-def _close_stdout() -> None:
-    # Python itself flushes once more at its end, which must not fail either.
-    with suppress(OSError, ValueError):
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _interrupt(number: int, _frame: FrameType | None) -> None:

@@ -3,12 +3,15 @@
 import argparse
 import sys
 from collections.abc import Sequence
+from importlib import metadata
 from typing import Final
 
 from feasibility import InputError, MissingDependencyError
-from feasibility.runtime.interrupts import end_output, interrupt_code, interruptible
+from feasibility.runtime.interrupts import interrupt_code, interruptible
+from feasibility.runtime.terminal import end_output
 from feasibility.sims_flanagan.fast.compilation import prefer_fast_compilation
 from seqsearch.commands import plot, polish, problems, resume, run, verify
+from seqsearch.commands.options import set_output
 
 _DESCRIPTION: Final = """\
 Find asteroid tours for a low-thrust spacecraft.
@@ -35,6 +38,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     prefer_fast_compilation()
     parsed = _parser().parse_args(arguments)
+    set_output(parsed)
     with interruptible():
         try:
             return int(parsed.run(parsed))
@@ -54,7 +58,15 @@ def _parser() -> argparse.ArgumentParser:
         description=_DESCRIPTION,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
+    parser.add_argument("--version", action="version", version=f"seqsearch {_version()}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     for command in _COMMANDS:
         command.add_parser(commands)
     return parser
+
+
+def _version() -> str:
+    try:
+        return metadata.version("seqsearch")
+    except metadata.PackageNotFoundError:
+        return "of a source tree"

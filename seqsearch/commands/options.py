@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from feasibility import InputError
+from feasibility.runtime.terminal import Level, say_json, set_level
 
 if TYPE_CHECKING:
     Commands = argparse._SubParsersAction[argparse.ArgumentParser]
@@ -28,6 +29,24 @@ def add_limits(command: argparse.ArgumentParser) -> None:
         help="stop after N full optimisations in all; passes go on until then",
     )
     add_workers(command)
+
+
+def add_output(command: argparse.ArgumentParser) -> None:
+    """Add how much is printed, and for whom."""
+    much = command.add_mutually_exclusive_group()
+    much.add_argument("-q", "--quiet", action="store_true", help="print results alone")
+    much.add_argument("-v", "--verbose", action="store_true", help="print all counts of each rank")
+    much.add_argument("--json", action="store_true", help="print the result as JSON, nothing else")
+
+
+def set_output(options: argparse.Namespace) -> None:
+    """Follow the options of `add_output`, where a command has them."""
+    if getattr(options, "json", False):
+        set_level(Level.SILENT)
+    elif getattr(options, "quiet", False):
+        set_level(Level.RESULTS)
+    else:
+        set_level(Level.DETAILS if getattr(options, "verbose", False) else Level.PROGRESS)
 
 
 def add_catalogue(command: argparse.ArgumentParser) -> None:
@@ -61,6 +80,16 @@ def parse_duration(text: str, option: str = "--time-limit") -> float:
     if match is None or match[2] not in _UNITS_S or float(match[1]) <= 0:
         raise InputError(f"{option} {text!r}: expected a duration such as 90s, 10min or 1h")
     return float(match[1]) * _UNITS_S[match[2]]
+
+
+def print_result(options: argparse.Namespace, folder: Path, code: int) -> int:
+    """Print the tours of a run folder as JSON, if that was asked for, and return the exit code."""
+    if getattr(options, "json", False) and code in (0, 130, 143):
+        # Imported here: it loads what writes runs.
+        from seqsearch.runs.summary import summary
+
+        say_json(summary(folder))
+    return code
 
 
 def sequence_path(run: str) -> Path:

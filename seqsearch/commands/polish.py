@@ -4,7 +4,13 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from seqsearch.commands.options import add_catalogue, add_workers, seconds
+from seqsearch.commands.options import (
+    add_catalogue,
+    add_output,
+    add_workers,
+    print_result,
+    seconds,
+)
 
 if TYPE_CHECKING:
     from seqsearch.commands.options import Commands
@@ -35,16 +41,18 @@ def add_parser(commands: "Commands") -> None:
     polish.add_argument("--seed", type=int, default=0, help="seed of the moves (default: 0)")
     add_catalogue(polish)
     add_workers(polish)
+    add_output(polish)
     polish.set_defaults(run=_polish)
 
 
 def _polish(options: argparse.Namespace) -> int:
     from seqsearch.runs.polishing import polish_run
 
-    return polish_run(
+    code = polish_run(
         Path(options.path),
         time_limit_s=seconds(options.time_limit),
         seed=options.seed,
         workers=options.workers,
         catalogue=options.catalogue,
     )
+    return print_result(options, Path(options.path), code)

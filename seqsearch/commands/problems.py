@@ -4,7 +4,7 @@ import argparse
 from typing import TYPE_CHECKING
 
 from feasibility import InputError
-from feasibility.runtime.interrupts import say
+from feasibility.runtime.terminal import say
 
 if TYPE_CHECKING:
     from seqsearch.commands.options import Commands

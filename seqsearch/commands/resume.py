@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from feasibility import InputError
-from seqsearch.commands.options import add_catalogue, add_limits, seconds
+from seqsearch.commands.options import add_catalogue, add_limits, add_output, print_result, seconds
 
 if TYPE_CHECKING:
     from seqsearch.commands.options import Commands
@@ -36,13 +36,14 @@ def add_parser(commands: "Commands") -> None:
     )
     add_catalogue(resume)
     add_limits(resume)
+    add_output(resume)
     resume.set_defaults(run=_resume)
 
 
 def _resume(options: argparse.Namespace) -> int:
     from seqsearch.runs.resuming import resume_search
 
-    return resume_search(
+    code = resume_search(
         Path(options.path),
         after=None if options.from_rank is None else parse_rank(options.from_rank),
         time_limit_s=seconds(options.time_limit),
@@ -50,6 +51,7 @@ def _resume(options: argparse.Namespace) -> int:
         workers=options.workers,
         catalogue=options.catalogue,
     )
+    return print_result(options, Path(options.path), code)
 
 
 def parse_rank(text: str) -> tuple[int, int]:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from feasibility import InputError
 from seqsearch.budget import Limits
-from seqsearch.commands.options import add_limits, seconds
+from seqsearch.commands.options import add_limits, add_output, print_result, seconds
 
 if TYPE_CHECKING:
     from seqsearch.commands.options import Commands
@@ -54,11 +54,12 @@ def add_parser(commands: "Commands") -> None:
         metavar="T",
         help="then polish the best tours for 90s, 5min (see polish)",
     )
+    add_output(run)
     run.set_defaults(run=_run)
 
 
 def _run(options: argparse.Namespace) -> int:
-    return run_search(
+    code, folder = run_search(
         options.problem,
         catalogue=options.catalogue,
         out=None if options.out is None else Path(options.out),
@@ -76,6 +77,7 @@ def _run(options: argparse.Namespace) -> int:
         },
         polish_s=seconds(options.polish, "--polish"),
     )
+    return print_result(options, folder, code)
 
 
 def run_search(
@@ -87,8 +89,8 @@ def run_search(
     limits: Limits,
     overrides: dict[str, Any],
     polish_s: float | None = None,
-) -> int:
-    """Run a search as the command line asks for it and return the exit code.
+) -> tuple[int, Path]:
+    """Run a search as the command line asks for it and return exit code and run folder.
 
     With `polish_s`, the best tours are polished for that many seconds afterwards.
     A fleet polishes each probe within the time limit instead.
@@ -116,8 +118,9 @@ def run_search(
         config = with_catalogue(config, str(Path(config.catalogue.file).absolute()))
     folder = out or Path("runs") / config.problem.name
     if config.fleet.probes > 1:
-        return run_fleet(config, folder, seed=seed, limits=limits, search_probe=begin_search)
+        code = run_fleet(config, folder, seed=seed, limits=limits, search_probe=begin_search)
+        return code, folder
     code = begin_search(config, folder, seed, limits)
     if code == 0 and polish_s is not None:
         code = polish_run(folder, time_limit_s=polish_s, seed=seed, workers=limits.workers)
-    return code
+    return code, folder

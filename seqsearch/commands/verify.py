@@ -1,11 +1,12 @@
 """``seqsearch verify``: check a tour, or those of a fleet, independently."""
 
 import argparse
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from feasibility.runtime.interrupts import say
-from seqsearch.commands.options import sequence_path
+from feasibility.runtime.terminal import say, say_json
+from seqsearch.commands.options import add_output, sequence_path
 
 if TYPE_CHECKING:
     from feasibility.orbits import Catalogue
@@ -44,6 +45,7 @@ def add_parser(commands: "Commands") -> None:
     verify.add_argument(
         "--catalogue", metavar="FILE", help="compare the bodies with this asteroid table"
     )
+    add_output(verify)
     verify.set_defaults(run=_verify)
 
 
@@ -58,48 +60,54 @@ def _verify(options: argparse.Namespace) -> int:
     fleet = is_fleet(path)
     paths = probe_paths(path) if fleet else [sequence_path(options.path)]
     tours = [read_tour(file) for file in paths]
-    passed = [
+    outcomes = [
         _verified(file, tour, options.problem, catalogue)
         for file, tour in zip(paths, tours, strict=True)
     ]
     if fleet:
         together = Verification((check_disjoint(tours),))
-        passed.append(together.passed)
+        outcomes.append(together)
         say(f"{sum(tour.n_asteroids for tour in tours)} asteroids on {len(tours)} probes")
         say(together.table())
-    say("verified" if all(passed) else "NOT verified")
-    return 0 if all(passed) else 1
+    passed = all(outcome.passed for outcome in outcomes)
+    say("verified" if passed else "NOT verified")
+    if options.json:
+        checks = [asdict(check) for outcome in outcomes for check in outcome.checks]
+        say_json({"verified": passed, "checks": checks})
+    return 0 if passed else 1
 
 
-def _verified(file: Path, tour: "Tour", problem: str | None, table: "Catalogue | None") -> bool:
-    """Check one tour, print how it fares, and return whether everything holds."""
+def _verified(
+    file: Path, tour: "Tour", problem: str | None, table: "Catalogue | None"
+) -> "Verification":
+    """Check one tour, print how it fares, and return it."""
     from seqsearch.problems.problem_file import table_at_hand
     from seqsearch.problems.rules_of import differences, rules_of
+    from seqsearch.tours.checks import Check, Verification
     from seqsearch.tours.verify import verify_tour
 
     say(tour.one_line())
     config, source = _problem_of(file, tour, problem)
     if config is None:
-        verification = verify_tour(tour, table)
-        _print(verification, file, tour)
+        verification = _print(verify_tour(tour, table), file, tour)
         say(
             "checked against the rules in its own file alone, which prove nothing; "
             "say whose rules hold with --problem NAME|FILE"
         )
-        return False
+        unknown = Check("rules of a known problem", False, "the file's own", "a problem's")
+        return Verification((*verification.checks, unknown))
     table = table or table_at_hand(config)
     rules = rules_of(config, tour, table)
     say(f"rules of problem {rules.name}, from {source}")
     for difference in differences(tour.rules, rules):
         say(f"the file states other rules: {difference}")
-    verification = verify_tour(tour, table, rules)
-    passed = _print(verification, file, tour)
-    if not passed and verify_tour(tour, table).passed:
+    verification = _print(verify_tour(tour, table, rules), file, tour)
+    if not verification.passed and verify_tour(tour, table).passed:
         say("it keeps only the rules in its own file")
-    return passed
+    return verification
 
 
-def _print(verification: "Verification", file: Path, tour: "Tour") -> bool:
+def _print(verification: "Verification", file: Path, tour: "Tour") -> "Verification":
     from seqsearch.tours.checks import Verification
     from seqsearch.tours.tour_files import check_csv
 
@@ -108,7 +116,7 @@ def _print(verification: "Verification", file: Path, tour: "Tour") -> bool:
         verification = Verification((*verification.checks, check_csv(tour, beside)))
     say(tour.summary())
     say(verification.table())
-    return verification.passed
+    return verification
 
 
 def _problem_of(file: Path, tour: "Tour", problem: str | None) -> "tuple[Config | None, str]":

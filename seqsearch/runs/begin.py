@@ -6,8 +6,8 @@ from typing import Final
 import numpy as np
 
 from feasibility.constants import YEAR_DAYS
-from feasibility.runtime.interrupts import say
 from feasibility.runtime.locks import folder_lock
+from feasibility.runtime.terminal import Level, say
 from seqsearch.beam.state import SearchState
 from seqsearch.budget import Limits
 from seqsearch.core.possible import check_possible
@@ -51,9 +51,10 @@ def begin_search(config: Config, path: Path, seed: int, limits: Limits) -> int:
         folder.write(record_tour(problem, state.tree, state.best_node), state.counters)
         say(
             f"{problem.name}: {len(problem.catalogue)} bodies from {problem.catalogue.source}, "
-            f"seed {seed}, writing to {folder.path}"
+            f"seed {seed}, writing to {folder.path}",
+            Level.PROGRESS,
         )
-        say(_window_line(problem))
+        say(_window_line(problem), Level.PROGRESS)
         return run_session(
             folder,
             checkpoints,

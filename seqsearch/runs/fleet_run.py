@@ -7,7 +7,7 @@ from pathlib import Path
 import msgspec
 
 from feasibility.runtime.folders import new_folder
-from feasibility.runtime.interrupts import say
+from feasibility.runtime.terminal import Level, say
 from seqsearch.budget import Limits
 from seqsearch.problems.problem_file import Config
 from seqsearch.runs.fleet import probe_folder, write_fleet
@@ -65,7 +65,7 @@ def run_fleet(
             left_s = max(1.0, limits.time_limit_s - (time.monotonic() - begin))
             share_s = left_s / (probes - number + 1)
         probe_seed = seed + number - 1
-        say(f"probe {number} of {probes}")
+        say(f"probe {number} of {probes}", Level.PROGRESS)
         polish_share = config.fleet.polish_share
         code = search_probe(
             single,

@@ -8,9 +8,10 @@ import numpy as np
 
 from feasibility import InputError
 from feasibility.runtime.atomic import write_json
-from feasibility.runtime.interrupts import interrupt_code, say
+from feasibility.runtime.interrupts import interrupt_code
 from feasibility.runtime.locks import folder_lock
 from feasibility.runtime.provenance import provenance
+from feasibility.runtime.terminal import Level, say
 from feasibility.runtime.workers import default_workers, worker_pool
 from seqsearch.core.problem import Problem
 from seqsearch.polish import PolishResult, PolishStep, distinct_tours, polish
@@ -93,10 +94,10 @@ def _polished(
         from feasibility.classifier.classifier import FeasibilityClassifier
 
         predictor = FeasibilityClassifier.load()
-    say(f"{run}: polishing {len(tours)} tours, the best: {before.summary()}")
+    say(f"{run}: polishing {len(tours)} tours, the best: {before.summary()}", Level.PROGRESS)
 
     def on_step(step: PolishStep, tour: Tour) -> None:
-        say(_step_line(step))
+        say(_step_line(step), Level.PROGRESS)
         if worth(tour) > worth(before):
             folder.write_polished(tour)
 
@@ -113,10 +114,10 @@ def _polished(
     _report(run, before, result, seed, time_limit_s)
     if worth(result.tour) > worth(before):
         plot_tour(result.tour, run / "tour.png")
-    say()
+    say(level=Level.PROGRESS)
     say(result.tour.one_line())
     say(f"{result.tour.summary()}; polish {result.stopped}, {result.moves} moves")
-    say(f"check it with: seqsearch verify {run}")
+    say(f"check it with: seqsearch verify {run}", Level.PROGRESS)
     return interrupt_code()
 
 

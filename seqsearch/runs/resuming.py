@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from feasibility import InputError
-from feasibility.runtime.interrupts import say
 from feasibility.runtime.locks import folder_lock
+from feasibility.runtime.terminal import say
 from seqsearch.budget import Limits
 from seqsearch.problems.problem_file import build_problem, read_config, with_catalogue
 from seqsearch.pruning.pruner_spec import parse_pruner

@@ -9,11 +9,11 @@ import numpy as np
 from feasibility import AllOf, Pruner
 from feasibility.classifier.predictor import LegPredictor
 from feasibility.pruners import PrunerContractError
-from feasibility.runtime.interrupts import interrupt_code, say
+from feasibility.runtime.interrupts import interrupt_code
+from feasibility.runtime.terminal import Level, say
 from feasibility.runtime.workers import default_workers, worker_pool
 from feasibility.sims_flanagan.fast.compilation import compile_kernels, sample_leg
 from seqsearch.beam.beam_search import search
-from seqsearch.beam.counters import RankCounters
 from seqsearch.beam.result import SearchResult
 from seqsearch.beam.state import SearchState
 from seqsearch.budget import Limits
@@ -23,9 +23,9 @@ from seqsearch.problems.problem_file import Config
 from seqsearch.pruning.audit_estimate import AuditEstimate
 from seqsearch.pruning.pruner_spec import predictor_of
 from seqsearch.runs.checkpoint import Checkpoints
+from seqsearch.runs.progress import Progress
 from seqsearch.runs.run_folder import RunFolder
 from seqsearch.tours.plots import plot_tour
-from seqsearch.tours.tour import Tour
 
 
 def run_session(
@@ -54,11 +54,12 @@ def run_session(
             checkpoints.save(state)
         tour = record_tour(problem, state.tree, state.best_node, state.closing)
         folder.write(tour, state.counters)
-        say(_rank_line(state.counters[-1], tour))
+        progress.rank(state.counters[-1], tour)
 
     workers = limits.workers or default_workers()
+    progress = Progress(limits.time_limit_s, state.spent_s)
     try:
-        with worker_pool(workers) as executor:
+        with worker_pool(workers) as executor, progress.alive():
             if config.search.solver == "fast":
                 _compile_side_by_side(executor, pruner)
             result = search(
@@ -98,31 +99,34 @@ def _audit_predictor(config: Config, pruner: AllOf) -> LegPredictor | None:
 
 
 def _report(path: Path, result: SearchResult, mended: int) -> None:
-    counters = result.counters
-    say()
-    if result.tour.legs:
-        say(result.tour.table())
-        say()
+    tour, counters = result.tour, result.counters
+    say(level=Level.PROGRESS)
+    if tour.legs:
+        say(tour.table(), Level.PROGRESS)
+        say(level=Level.PROGRESS)
     if counters and (barren := counters[-1].barren_pruner()):
-        say(f"no leg survived pruner {barren} at rank {counters[-1].rank}")
+        say(f"no leg survived pruner {barren} at rank {counters[-1].rank}", Level.PROGRESS)
     if mended:
-        say(f"worker processes were lost and replaced {mended} times")
+        say(f"worker processes were lost and replaced {mended} times", Level.PROGRESS)
     audits = [record.audit for record in counters if record.audit is not None]
     if audits:
-        say(AuditEstimate.of(audits).one_line())
+        say(AuditEstimate.of(audits).one_line(), Level.PROGRESS)
     optimised = sum(record.optimised for record in counters)
     if optimised:
-        failed = 1.0 - sum(record.feasible for record in counters) / optimised
-        say(f"{optimised} legs optimised, {100 * failed:.1f} % of them could not be flown")
-    if not result.tour.bodies:
+        failed = 100.0 * (1.0 - sum(record.feasible for record in counters) / optimised)
+        say(
+            f"{optimised} legs optimised, {failed:.1f} % of them could not be flown",
+            Level.PROGRESS,
+        )
+    if tour.bodies:
+        say(tour.one_line())
+        say(f"{tour.summary()}; search {result.stopped}")
+    else:
         say(f"nothing found yet (search {result.stopped}); give more time")
-        say(_go_on(path))
-        return
-    say(result.tour.one_line())
-    say(f"{result.tour.summary()}; search {result.stopped}")
     if result.stopped != "complete":
-        say(_go_on(path))
-    say(f"check it with: seqsearch verify {path}")
+        say(_go_on(path), Level.PROGRESS)
+    if tour.legs:
+        say(f"check it with: seqsearch verify {path}", Level.PROGRESS)
 
 
 def _go_on(path: Path) -> str:
@@ -141,19 +145,3 @@ def _compile_side_by_side(executor: Executor | None, pruner: Pruner) -> None:
         compile_kernels()
     else:
         solver.result()
-
-
-def _rank_line(counters: RankCounters, tour: Tour) -> str:
-    if counters.rank == 0:
-        return (
-            f"pass {counters.pass_number} scouts : {counters.nodes} nodes, "
-            f"{counters.proposed} proposed, {counters.kept} itineraries to optimise, "
-            f"{counters.seconds:.1f} s | best {tour.headline()}"
-        )
-    pruned = ", ".join(f"{name} {count}" for name, count in counters.pruned.items())
-    return (
-        f"pass {counters.pass_number} rank {counters.rank:>2}: {counters.nodes} nodes, "
-        f"{counters.proposed} proposed, pruned {pruned or 'none'}, "
-        f"{counters.optimised} optimised, {counters.feasible} feasible, {counters.kept} kept, "
-        f"{counters.seconds:.1f} s | best {tour.headline()}"
-    )

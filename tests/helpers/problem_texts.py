@@ -18,6 +18,6 @@ synthetic_bodies = 300
 
 QUICK = (
     GOOD
-    + "\n[search]\nbeam_width = 3\nstarts = 6\nstart_epochs = 2\nneighbours = 20\n"
-    + ("tof_days_step = 40\nsolves_per_rank = 60\n")
+    + '\n[search]\npruner = "lambert:1.3,mima2:0.97"\nbeam_width = 3\nstarts = 6\n'
+    + "start_epochs = 2\nneighbours = 20\ntof_days_step = 40\nsolves_per_rank = 60\n"
 )

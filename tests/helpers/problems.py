@@ -30,6 +30,7 @@ def small_problem(**changes: Any) -> RendezvousProblem:
 def small_settings(**changes: Any) -> SearchSettings:
     """Return settings of seconds: a beam of six."""
     values: dict[str, Any] = {
+        "pruner": "lambert:1.3,mima2:0.97",
         "beam_width": 6,
         "starts": 12,
         "start_epochs": 4,

@@ -80,7 +80,7 @@ def test_the_example_passes_its_own_tests(pasted):
     (test,) = pasted.glob("pasted/tests/**/test_*.py")
     options = ["-q", "-p", "join_example", "-p", "no:cacheprovider", "-c", os.devnull]
     said = _run(pasted, "pytest", *options, "--rootdir", str(pasted), str(test))
-    assert "2 passed" in said
+    assert "3 passed" in said
 
 
 @pytest.mark.parametrize("name", [name for name in FILES if name.endswith(".py")])

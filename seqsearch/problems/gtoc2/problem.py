@@ -9,16 +9,14 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility import InputError, Legs, Spacecraft
+from feasibility import InputError, Legs
 from feasibility.classifier.predictor import LegPredictor
-from feasibility.orbits import Catalogue, earth
+from feasibility.orbits import Catalogue
 from feasibility.runtime.workers import in_threads
 from seqsearch.core.custom_moves import CustomCandidates, CustomMoves
 from seqsearch.core.hops import Hops
-from seqsearch.core.mission import days_until_end
 from seqsearch.core.nodes import Nodes
 from seqsearch.core.recording import tour_body
-from seqsearch.core.tree import FlownLeg
 from seqsearch.problems.gtoc2.group_sets import NO_GROUP, GroupSets
 from seqsearch.problems.gtoc2.launches import Launches
 from seqsearch.problems.gtoc2.outlook import Outlook
@@ -26,9 +24,10 @@ from seqsearch.problems.gtoc2.plans import Plans
 from seqsearch.problems.gtoc2.prospects import Prospects
 from seqsearch.problems.gtoc2.rules import Gtoc2Rules
 from seqsearch.problems.gtoc2.transfers import Transfers
+from seqsearch.problems.moves.earth_first import earth_first
 from seqsearch.problems.moves.lambert_departure import lambert_departure
 from seqsearch.problems.moves.questions import Questions
-from seqsearch.problems.rendezvous import RendezvousProblem
+from seqsearch.problems.variant import RendezvousVariant
 from seqsearch.settings import SearchSettings
 from seqsearch.tours.events import Groups, Launch
 from seqsearch.tours.scores import MassRate
@@ -44,7 +43,7 @@ _NODES_AT_ONCE: Final = 16
 
 @final
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Gtoc2Problem:
+class Gtoc2Problem(RendezvousVariant):
     """Launch from the Earth, then one asteroid of each group.
 
     A tour that has visited all groups is complete; the best is the one with the largest
@@ -64,51 +63,18 @@ class Gtoc2Problem:
         The catalogue has a body with the id of the Earth, 0, or no column with the groups.
     """
 
-    base: RendezvousProblem
     rules: Gtoc2Rules
 
     def __post_init__(self) -> None:
-        source = self.base.catalogue.source
-        if 0 in self.base.catalogue.ids:
+        asteroids, column = self.base.catalogue, self.rules.group_column
+        if column not in asteroids.extra:
             raise InputError(
-                f"problem {self.name}: {source} has a body with id 0, which is the Earth's"
+                f"problem {self.name}: {asteroids.source} has no column {column!r}, expected "
+                "one that says to which group each asteroid belongs (further columns: "
+                f"{', '.join(asteroids.extra) or 'none'})"
             )
-        if self.rules.group_column not in self.base.catalogue.extra:
-            known = ", ".join(self.base.catalogue.extra) or "none"
-            raise InputError(
-                f"problem {self.name}: {source} has no column {self.rules.group_column!r}, "
-                f"which says to which group each asteroid belongs; further columns are {known}"
-            )
-
-    @property
-    def name(self) -> str:
-        """Name, for reports."""
-        return self.base.name
-
-    @property
-    def spacecraft(self) -> Spacecraft:
-        """Dry mass, thrust and specific impulse."""
-        return self.base.spacecraft
-
-    @property
-    def m0(self) -> float:
-        """Mass in kg at the launch."""
-        return self.base.m0
-
-    @property
-    def first_departure_mjd2000(self) -> tuple[float, float]:
-        """Earliest and latest epoch of the launch."""
-        return self.base.first_departure_mjd2000
-
-    @property
-    def max_duration_days(self) -> float:
-        """Longest time from the launch to the last arrival."""
-        return self.base.max_duration_days
-
-    @property
-    def min_stay_days(self) -> float:
-        """Shortest stay at each asteroid but the last."""
-        return self.base.min_stay_days
+        # Looked at once, so that an id that is the Earth's is refused.
+        assert len(self.catalogue) == len(asteroids) + 1
 
     @property
     def start_ids(self) -> tuple[int, ...]:
@@ -118,14 +84,7 @@ class Gtoc2Problem:
     @cached_property
     def catalogue(self) -> Catalogue:
         """The Earth, row 0, and the asteroids."""
-        planet, asteroids = earth(), self.base.catalogue
-        return Catalogue(
-            ids=np.concatenate([planet.ids, asteroids.ids]),
-            names=[*planet.names, *asteroids.names],
-            epoch_mjd2000=np.concatenate([planet.epoch_mjd2000, asteroids.epoch_mjd2000]),
-            elements=np.concatenate([planet.elements, asteroids.elements]),
-            source=asteroids.source,
-        )
+        return earth_first(self.base.catalogue)
 
     @cached_property
     def group_ids(self) -> tuple[tuple[int, ...], ...]:
@@ -153,10 +112,6 @@ class Gtoc2Problem:
     def start_rows(self) -> _Rows:
         """Return the catalogue row of the Earth."""
         return np.zeros(1, dtype=np.intp)
-
-    def start_nodes(self, rows: _Rows, t_mjd2000: _Array, /) -> Nodes:
-        """Return the (k,) nodes at bodies and epochs, with full tanks."""
-        return Nodes.at_start(rows, t_mjd2000, np.full(len(rows), self.m0))
 
     def starts(self, settings: SearchSettings, rng: np.random.Generator, /) -> Nodes:
         """Return launches, one from each of ``settings.starts`` equal slices of the window.
@@ -218,12 +173,6 @@ class Gtoc2Problem:
         groups = self.outlook.groups
         return groups.contain(groups.left(nodes.visited)[:, None], target)
 
-    def days_left(self, nodes: Nodes, t_dep_mjd2000: _Array, /) -> _Array:
-        """Return (n, d) days until the longest duration is over; -inf outside the window."""
-        return days_until_end(
-            nodes, t_dep_mjd2000, self.first_departure_mjd2000[1], self.max_duration_days
-        )
-
     def hops(
         self,
         nodes: Nodes,
@@ -248,10 +197,6 @@ class Gtoc2Problem:
         )
         late = replace(at, t_ready_mjd2000=t_dep_mjd2000)
         return self._hops(late, Plans(np.arange(len(parent)), target, velocity, tof_days))
-
-    def closing(self, row: int, t_mjd2000: float, mass: float, /) -> tuple[FlownLeg, ...]:  # noqa: ARG002
-        """Return no legs: a tour ends with its last arrival."""
-        return ()
 
     def tour_cost(self, nodes: Nodes, settings: SearchSettings, /) -> _Array:  # noqa: ARG002
         """Return (n,) the score in kg/year with its sign changed; a forecast of it before."""

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from feasibility import InputError, Spacecraft, optimise
 from feasibility.classifier.predictor import LegPredictor
-from feasibility.orbits import Catalogue, earth
+from feasibility.orbits import Catalogue
 from feasibility.runtime.workers import in_threads
 from feasibility.sims_flanagan import solve_max_initial_mass
 from seqsearch.core.custom_moves import CustomCandidates, CustomMoves
@@ -27,6 +27,7 @@ from seqsearch.problems.gtoc5.rules import Gtoc5Rules
 from seqsearch.problems.gtoc5.self_fly_by import shortest_self_fly_by_days
 from seqsearch.problems.gtoc5.transfer_plans import TransferPlans
 from seqsearch.problems.moves.directions import even_directions
+from seqsearch.problems.moves.earth_first import earth_first
 from seqsearch.problems.moves.lambert_departure import lambert_departure
 from seqsearch.problems.rendezvous import RendezvousProblem
 from seqsearch.settings import SearchSettings
@@ -69,11 +70,6 @@ class Gtoc5Problem:
     rules: Gtoc5Rules
 
     def __post_init__(self) -> None:
-        if 0 in self.base.catalogue.ids:
-            raise InputError(
-                f"problem {self.name}: {self.base.catalogue.source} has a body with id 0, "
-                "which is the Earth's"
-            )
         least = self.maker.least_mass_at_rendezvous
         if self.m0 <= least:
             raise InputError(
@@ -119,14 +115,7 @@ class Gtoc5Problem:
     @cached_property
     def catalogue(self) -> Catalogue:
         """The Earth, row 0, and the asteroids."""
-        planet, asteroids = earth(), self.base.catalogue
-        return Catalogue(
-            ids=np.concatenate([planet.ids, asteroids.ids]),
-            names=[*planet.names, *asteroids.names],
-            epoch_mjd2000=np.concatenate([planet.epoch_mjd2000, asteroids.epoch_mjd2000]),
-            elements=np.concatenate([planet.elements, asteroids.elements]),
-            source=asteroids.source,
-        )
+        return earth_first(self.base.catalogue)
 
     @cached_property
     def maker(self) -> LegMaker:

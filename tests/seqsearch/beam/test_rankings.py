@@ -214,7 +214,13 @@ def test_a_frontier_made_anew_from_what_waits_goes_on_as_the_old_one(race):
 def test_a_search_with_another_order_finds_a_tour(changes):
     problem = small_problem()
     settings = SearchSettings().with_(
-        beam_width=8, starts=10, start_epochs=3, neighbours=12, solves_per_rank=60, **changes
+        pruner="lambert:1.3,mima2:0.97",
+        beam_width=8,
+        starts=10,
+        start_epochs=3,
+        neighbours=12,
+        solves_per_rank=60,
+        **changes,
     )
     result = search(problem, settings=settings)
     depths = [node["rank"] for _, node in result.tree.graph.nodes(data=True)]

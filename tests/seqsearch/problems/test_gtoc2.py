@@ -11,7 +11,7 @@ from feasibility.constants import AU, EARTH_VELOCITY, mjd_to_mjd2000
 from feasibility.orbits import Catalogue
 from seqsearch import RendezvousProblem, SearchSettings, check_problem, search, verify_tour
 from seqsearch.commands.cli import main
-from seqsearch.core.custom_moves import CustomMoves
+from seqsearch.core.check_problem import check_problem
 from seqsearch.core.nodes import Nodes
 from seqsearch.core.optimisation import solve_hops
 from seqsearch.core.problem import Problem
@@ -182,10 +182,10 @@ def test_rings_lie_around_their_directions():
 # Moves
 
 
-def test_the_problem_honours_the_contract():
+def test_the_problem_honours_the_contract(classifier):
     problem = toy_problem()
     assert isinstance(problem, Problem)
-    assert isinstance(problem.custom_moves, CustomMoves)
+    check_problem(problem, predictor=classifier)
     assert problem.catalogue.ids[problem.start_rows()].tolist() == [0]
     assert [len(group) for group in problem.group_ids] == [16, 16, 16]
     assert problem.group_ids[0] == tuple(range(2, 48, 3))  # value 3 of 7, 3, 5
@@ -377,7 +377,7 @@ def test_catalogues_that_do_not_fit_are_refused():
     arguments = (bodies.names, 8000.0, bodies.elements)
     with pytest.raises(InputError, match="clash has a body with id 0"):
         toy_problem(catalogue=Catalogue([0, 1, 2], *arguments, "clash", extra=bodies.extra))
-    with pytest.raises(InputError, match=r"no column 'group'.*further columns are none"):
+    with pytest.raises(InputError, match=r"no column 'group'.*further columns: none"):
         toy_problem(catalogue=Catalogue([1, 2, 3], *arguments, "plain"))
 
 
