@@ -9,7 +9,7 @@ import pytest
 from feasibility import FeasibilityClassifier, InputError, Spacecraft
 from feasibility.constants import AU, EARTH_VELOCITY, mjd_to_mjd2000
 from feasibility.orbits import Catalogue
-from seqsearch import RendezvousProblem, SearchSettings, check_problem, search, verify_tour
+from seqsearch import RendezvousProblem, SearchSettings, search, verify_tour
 from seqsearch.commands.cli import main
 from seqsearch.core.check_problem import check_problem
 from seqsearch.core.nodes import Nodes
@@ -189,7 +189,6 @@ def test_the_problem_honours_the_contract(classifier):
     assert problem.catalogue.ids[problem.start_rows()].tolist() == [0]
     assert [len(group) for group in problem.group_ids] == [16, 16, 16]
     assert problem.group_ids[0] == tuple(range(2, 48, 3))  # value 3 of 7, 3, 5
-    check_problem(problem, predictor=FeasibilityClassifier.load())
 
 
 def test_a_body_of_a_group_that_was_visited_may_not_be_visited():
