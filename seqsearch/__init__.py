@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from seqsearch.problems.rendezvous import RendezvousProblem
     from seqsearch.settings import SearchSettings
     from seqsearch.tours.checks import Verification
+    from seqsearch.tours.plots import plot_tour
     from seqsearch.tours.tour import Tour
     from seqsearch.tours.tour_files import read_tour
     from seqsearch.tours.verify import verify_tour
@@ -37,6 +38,7 @@ _HOMES = {
     "check_problem": "seqsearch.core.check_problem",
     "check_ranking": "seqsearch.beam.rankings.check",
     "load_problem": "seqsearch.problems.problem_file",
+    "plot_tour": "seqsearch.tours.plots",
     "read_config": "seqsearch.problems.problem_file",
     "read_tour": "seqsearch.tours.tour_files",
     "search": "seqsearch.beam.beam_search",
@@ -56,6 +58,7 @@ __all__ = [
     "check_problem",
     "check_ranking",
     "load_problem",
+    "plot_tour",
     "read_config",
     "read_tour",
     "search",

@@ -9,7 +9,7 @@ from seqsearch.tours.tour import Tour
 
 
 @final
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class SearchResult:
     """What a search found.
 
@@ -29,3 +29,9 @@ class SearchResult:
     tree: SearchTree
     counters: list[RankCounters]
     stopped: str
+
+    def __repr__(self) -> str:
+        return f"SearchResult({self.tour!r}, {len(self.tree)} nodes, search {self.stopped})"
+
+    def _repr_html_(self) -> str:
+        return self.tour._repr_html_()

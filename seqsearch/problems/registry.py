@@ -59,11 +59,14 @@ def plugins() -> dict[str, ProblemPlugin]:
         A plug-in cannot be imported, has rules and no way to build a problem or the other way
         round, rules that are no struct, or a name that occurs twice or cannot be that of a table.
     """
+    # The same entry may be there twice: of an installation and of a source tree beside it.
+    group = metadata.entry_points(group=ENTRY_POINTS)
+    entries = {(entry.name, entry.value): entry for entry in group}
     found: dict[str, ProblemPlugin] = {}
-    for entry in sorted(metadata.entry_points(group=ENTRY_POINTS), key=lambda entry: entry.name):
-        if entry.name in found:
-            raise InputError(f"problem plug-in {entry.name}: two installed packages bring one")
-        found[entry.name] = _loaded(entry)
+    for (name, _), entry in sorted(entries.items()):
+        if name in found:
+            raise InputError(f"problem plug-in {name}: two installed packages bring one")
+        found[name] = _loaded(entry)
     return found
 
 

@@ -1,10 +1,10 @@
 """`Tour`: a sequence of visits, ready to be written, read and verified."""
 
-from typing import Final, final
+from typing import Any, Final, final
 
-from feasibility.constants import G0, MJD2000_MJD, MU_SUN
+from feasibility.constants import G0, MU_SUN
 from feasibility.errors import InputError
-from seqsearch.tours.dates import date_of
+from seqsearch.tours.display import dataframe, html_table, text_table
 from seqsearch.tours.events.protocol import TourEvent
 from seqsearch.tours.records import Record, TourBody, TourLeg
 from seqsearch.tours.scores.protocol import ScoreRule
@@ -113,19 +113,17 @@ class Tour(Record, frozen=True, kw_only=True):
 
     def table(self) -> str:
         """Return the legs as a text table."""
-        header = (
-            f"{'leg':>3}  {'from':>7}  {'to':>7}  {'name':<14}  {'departure, MJD':<20}  "
-            f"{'arrival':<10}  {'days':>7}  {'m0 kg':>8}  {'mf kg':>8}  {'margin':>6}"
-        )
-        lines = [header, "-" * len(header)]
-        lines += [
-            f"{k:>3}  {leg.from_id:>7}  {leg.to_id:>7}  {self.body(leg.to_id).name[:14]:<14}  "
-            f"{date_of(leg.t_dep_mjd2000)} {leg.t_dep_mjd2000 + MJD2000_MJD:>9.2f}  "
-            f"{date_of(leg.t_arr_mjd2000)}  "
-            f"{leg.tof_days:>7.2f}  {leg.m0_kg:>8.2f}  {leg.m_final_kg:>8.2f}  {leg.margin:>6.3f}"
-            for k, leg in enumerate(self.legs, 1)
-        ]
-        return "\n".join(lines)
+        return text_table(self)
+
+    def to_dataframe(self) -> Any:
+        """Return the legs as a `pandas.DataFrame`, one row a leg.
+
+        Raises
+        ------
+        MissingDependencyError
+            pandas is not installed.
+        """
+        return dataframe(self)
 
     def summary(self) -> str:
         """Return one line: what counts, duration, mass."""
@@ -142,3 +140,9 @@ class Tour(Record, frozen=True, kw_only=True):
         if not rule.name:
             return visits
         return f"{rule.name} {self.score:.1f} {rule.unit}".rstrip() + f", {visits}"
+
+    def __repr__(self) -> str:
+        return f"Tour({self.rules.name}: {self.summary()})"
+
+    def _repr_html_(self) -> str:
+        return html_table(self)
