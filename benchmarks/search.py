@@ -34,7 +34,7 @@ from feasibility.sims_flanagan.fast.compilation import (
 )
 from seqsearch.beam.beam_search import search
 from seqsearch.beam.state import SearchState
-from seqsearch.commands.cli import parse_duration
+from seqsearch.commands.options import parse_duration
 from seqsearch.core.problem import Problem
 from seqsearch.problems.problem_file import build_problem, read_config, with_catalogue
 from seqsearch.pruning.audit_estimate import AuditEstimate

@@ -10,34 +10,38 @@ from feasibility.legs import Legs
 
 _N_LEGS: Final = 64
 _ALONE: Final = 5
-"""Legs that are asked about alone."""
+"""Things that are asked about alone."""
 
 
-def regroupings(n: int, rng: np.random.Generator) -> list[tuple[str, NDArray[np.intp]]]:
-    """Return batches of rows of n legs in which a row-wise answer for a leg stays the same.
+def regroupings(
+    n: int, rng: np.random.Generator, thing: str = "leg"
+) -> list[tuple[str, NDArray[np.intp]]]:
+    """Return batches of rows of n things in which a row-wise answer for each stays the same.
 
     Parameters
     ----------
     n : int
-        Number of legs.
+        Number of things.
     rng : numpy.random.Generator
         Shuffles them.
+    thing : str
+        What they are.
 
     Returns
     -------
     list of (str, (k,) intp)
-        What is done to the legs, as the end of a sentence, and their rows.
+        What is done to the things, as the end of a sentence, and their rows.
     """
     every = np.arange(n)
     batches: list[tuple[str, NDArray[np.intp]]] = [
-        ("the legs are reversed", every[::-1]),
-        ("the legs are shuffled", rng.permutation(n)),
+        (f"the {thing}s are reversed", every[::-1]),
+        (f"the {thing}s are shuffled", rng.permutation(n)),
         ("the first half is asked alone", every[: n // 2]),
         ("the second half is asked alone", every[n // 2 :]),
-        ("each leg is asked twice", np.repeat(every, 2)),
+        (f"each {thing} is asked twice", np.repeat(every, 2)),
     ]
     batches += [
-        (f"leg {row} is asked alone", every[row : row + 1]) for row in range(min(n, _ALONE))
+        (f"{thing} {row} is asked alone", every[row : row + 1]) for row in range(min(n, _ALONE))
     ]
     return batches
 

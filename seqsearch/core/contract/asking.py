@@ -13,9 +13,6 @@ from numpy.typing import NDArray
 from seqsearch.core.nodes import Nodes
 from seqsearch.core.problem import Problem
 
-_ALONE = 3
-"""Rows that are asked about alone."""
-
 
 @final
 class ProblemContractError(AssertionError):
@@ -128,21 +125,6 @@ class Asked:
                 member, f"returned dtype {answer.dtype}, expected {np.dtype(dtype).name}"
             )
         return answer
-
-
-def regroupings(n: int, rng: np.random.Generator) -> list[tuple[str, NDArray[np.intp]]]:
-    """Return batches of n rows in which a row-wise answer stays the same, and their names."""
-    every = np.arange(n)
-    batches: list[tuple[str, NDArray[np.intp]]] = [
-        ("the rows are reversed", every[::-1]),
-        ("the rows are shuffled", rng.permutation(n)),
-        ("the first half is asked alone", every[: (n + 1) // 2]),
-        ("each row is asked twice", np.repeat(every, 2)),
-    ]
-    batches += [
-        (f"row {row} is asked alone", every[row : row + 1]) for row in range(min(n, _ALONE))
-    ]
-    return batches
 
 
 def same(one: Any, other: Any, tolerance: float = 0.0) -> bool:

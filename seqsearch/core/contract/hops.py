@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 
 from feasibility import Legs
 from feasibility.arrays import StructOfArrays
-from seqsearch.core.contract.asking import Asked, regroupings, same
+from feasibility.orbits.varied_legs import regroupings
+from seqsearch.core.contract.asking import Asked, same
 from seqsearch.core.hops import Hops
 from seqsearch.core.nodes import Nodes
 
@@ -71,7 +72,7 @@ def check_hops(asked: Asked, nodes: Nodes, moves: Moves, rng: np.random.Generato
                 "hops",
                 f"hop {row} {what} at {found[row]:.6f} MJD2000, asked for {wanted[row]:.6f}",
             )
-    for what, rows in regroupings(len(moves), rng):
+    for what, rows in regroupings(len(moves), rng, "hop"):
         some = moves.take(rows)
         alone = ask(
             nodes.take(some.parent),

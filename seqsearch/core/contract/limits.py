@@ -5,7 +5,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from seqsearch.core.contract.asking import Asked, regroupings, same
+from feasibility.orbits.varied_legs import regroupings
+from seqsearch.core.contract.asking import Asked, same
 from seqsearch.core.nodes import Nodes
 from seqsearch.settings import SearchSettings
 
@@ -39,7 +40,7 @@ def check_may_visit(asked: Asked, nodes: Nodes, rng: np.random.Generator) -> NDA
         node, column = np.argwhere(again)[0]
         body = asked.problem.catalogue.ids[target[node, column]]
         raise asked.breach("may_visit", f"node {node} may visit body {body} a second time")
-    for what, rows in regroupings(n, rng):
+    for what, rows in regroupings(n, rng, "node"):
         if not same(asked.ask("may_visit", nodes.take(rows), target[rows]), allowed[rows]):
             raise asked.breach("may_visit", f"not row-wise: another answer when {what}")
     if not same(asked.ask("may_visit", nodes, target[:, ::-1]), allowed[:, ::-1]):
@@ -73,7 +74,7 @@ def check_days_left(asked: Asked, nodes: Nodes, rng: np.random.Generator) -> Non
             "days_left",
             f"a tour could last {over.max():g} days longer than max_duration_days",
         )
-    for what, rows in regroupings(len(nodes), rng):
+    for what, rows in regroupings(len(nodes), rng, "node"):
         if not same(asked.ask("days_left", nodes.take(rows), departure[rows]), left[rows]):
             raise asked.breach("days_left", f"not row-wise: another answer when {what}")
 
@@ -86,6 +87,6 @@ def check_tour_cost(
     cost = asked.array("tour_cost", answer, (len(nodes),), np.float64)
     if not np.isfinite(cost).all():
         raise asked.breach("tour_cost", f"returned {cost[~np.isfinite(cost)][0]}")
-    for what, rows in regroupings(len(nodes), rng):
+    for what, rows in regroupings(len(nodes), rng, "node"):
         if not same(asked.ask("tour_cost", nodes.take(rows), settings), cost[rows], _TOLERANCE):
             raise asked.breach("tour_cost", f"not row-wise: another answer when {what}")

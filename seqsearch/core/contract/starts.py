@@ -5,7 +5,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from seqsearch.core.contract.asking import Asked, regroupings, same
+from feasibility.orbits.varied_legs import regroupings
+from seqsearch.core.contract.asking import Asked, same
 from seqsearch.core.nodes import Nodes
 
 _COUNT: Final = 24
@@ -31,7 +32,7 @@ def check_starts(asked: Asked, rng: np.random.Generator) -> Nodes:
     nodes: Nodes = answer
     if not (np.array_equal(nodes.row, rows) and np.array_equal(nodes.t_arr_mjd2000, epochs)):
         raise asked.breach("start_nodes", "the nodes are not at the rows and epochs asked for")
-    for what, some in regroupings(_COUNT, rng):
+    for what, some in regroupings(_COUNT, rng, "start"):
         if not same(asked.ask("start_nodes", rows[some], epochs[some]), nodes.take(some)):
             raise asked.breach("start_nodes", f"not row-wise: another node when {what}")
     asked.ask("start_nodes", rows[:0], epochs[:0])
