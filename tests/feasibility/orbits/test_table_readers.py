@@ -207,7 +207,7 @@ def test_the_orbits_of_the_minor_planet_center_are_read(tmp_path):
     assert catalogue.names == ("3 Someone", "A0001", "1994 WY1")
     assert_allclose(catalogue.elements, [EXPECTED] * 3)
     assert_array_equal(catalogue.epoch_mjd2000 + 51544, [59000, 58600, 13497])
-    with pytest.raises(InputError, match="line 11: no orbit in the format of MPCORB"):
+    with pytest.raises(InputError, match="line 10: no orbit in the format of MPCORB"):
         read(tmp_path, MPCORB + "00004 cut\n")
 
 
