@@ -144,7 +144,7 @@ def test_a_byte_order_mark_does_not_matter(tmp_path, encoding):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (f"beam = {2**63}", "mine: beam is a whole number of about 19 digits"),
+        (f"beam = {2**63}", "mine: beam is a whole number of about 20 digits"),
         (f"beam = -{10**400}", "mine: beam is a whole number of about 40[01] digits"),
         ("beam = 1" + 5000 * "0", "mine: not valid TOML"),
         (
