@@ -21,7 +21,11 @@ The verdict is "good enough" where at least 95 % of the legs are in the model's
 domain, balanced accuracy is at least 0.99, at least 97 % of the legs within
 15 % of the boundary are judged rightly, and the interval of the pruner's recall
 reaches the recall asked for; "retrain" otherwise, with what falls short; "too
-few legs" with less than 50 legs of a class or 100 within 15 % of the boundary.
+few legs" with less than 50 legs of a class or 100 within 15 % of the boundary;
+it then says how many legs are needed.
+
+Exit code: 0 good enough, 3 retrain, 4 too few legs; 2 for input that cannot be
+used.
 
 The spacecraft is a TOML file with these keys:
 
@@ -59,7 +63,7 @@ def add_parser(commands: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Do what the command line asks for and return the exit code, 0 whatever the verdict.
+    """Do what the command line asks for and return the exit code, which tells the verdict.
 
     Raises
     ------
@@ -69,7 +73,7 @@ def run(options: argparse.Namespace) -> int:
     from feasibility.classifier.classifier import FeasibilityClassifier
     from feasibility.runtime.atomic import write_json
     from feasibility.runtime.provenance import provenance
-    from feasibility.spacecraft.assess import assess
+    from feasibility.spacecraft.assess import EXIT_CODES, assess
     from feasibility.spacecraft.legs import make, parts_of
     from feasibility.spacecraft.spacecraft_file import read_spacecraft
 
@@ -95,4 +99,4 @@ def run(options: argparse.Namespace) -> int:
         }
         write_json(Path(options.out), record)
         print(f"wrote {options.out}")
-    return 0
+    return EXIT_CODES[outcome.verdict]

@@ -5,6 +5,7 @@ import sys
 from collections.abc import Sequence
 from typing import Final
 
+from feasibility import __version__
 from feasibility.commands import (
     assess,
     evaluate,
@@ -19,6 +20,7 @@ from feasibility.commands.options import CommandParser
 from feasibility.errors import InputError, MissingDependencyError
 from feasibility.runtime.interrupts import interrupt_code, interruptible
 from feasibility.runtime.terminal import end_output
+from feasibility.runtime.warning_lines import warnings_as_lines
 from feasibility.sims_flanagan.fast.compilation import prefer_fast_compilation
 
 _DESCRIPTION: Final = """\
@@ -42,7 +44,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     line on stderr; 130 after Ctrl-C, 143 after SIGTERM.
     """
     prefer_fast_compilation()
-    with interruptible():
+    with interruptible(), warnings_as_lines("feasibility"):
         try:
             options = _parser().parse_args(arguments)
             return int(options.run(options))
@@ -64,6 +66,7 @@ def _parser() -> argparse.ArgumentParser:
         description=_DESCRIPTION,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
+    parser.add_argument("--version", action="version", version=f"%(prog)s {__version__}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     for command in (generate, inspect, protocols, train, evaluate, assess, retrain, study):
         command.add_parser(commands)

@@ -1,6 +1,7 @@
 """The command ``feasibility evaluate``."""
 
 import argparse
+import warnings
 from pathlib import Path
 from typing import Any, Final
 
@@ -15,6 +16,8 @@ and, of a margin model, the errors of log(m*/m0) and of the final mass. Beside
 it stand what closed forms say of the same legs, each with its best Lambert
 branch: the Lambert delta-v, MIMA and MIMA2; and the public network
 neural_lowthrust where it is installed.
+
+A dataset whose legs the model has learned from is warned about.
 
 With --out, all is written as metrics.json and metrics.md, with plots of the
 ROC curves, of the reliability and of the margins; of several datasets one
@@ -58,6 +61,7 @@ def run(options: argparse.Namespace) -> int:
     from feasibility.dataset import read_dataset
     from feasibility.evaluation.evaluate import by_family, evaluate
     from feasibility.evaluation.peers import known_peers
+    from feasibility.evaluation.training_legs import trained_on
     from feasibility.runtime.atomic import write_json, write_text
 
     classifier = FeasibilityClassifier.load(options.model)
@@ -69,7 +73,14 @@ def run(options: argparse.Namespace) -> int:
     model = Path(options.model).name
     evaluations = {}
     for folder, name in zip(folders, names, strict=True):
-        evaluation = evaluations[name] = evaluate(classifier, read_dataset(folder), peers)
+        dataset = read_dataset(folder)
+        if trained_on(classifier.artefact, dataset.metadata):
+            warnings.warn(
+                f"{folder}: the model was trained on legs of the same protocol, catalogue and "
+                "seed; its figures are too good, expected a dataset of another --seed",
+                stacklevel=2,
+            )
+        evaluation = evaluations[name] = evaluate(classifier, dataset, peers)
         if len(folders) > 1:
             print(f"## {name}\n")
         print(evaluation.table())

@@ -23,6 +23,7 @@ says in a minute whether that is worth while.
    spacecraft, so that nothing is forgotten.
 2. The default model's nets are trained on with them, and its probabilities and
    thresholds fitted anew.
+   Where hardly any leg can be flown, or hardly any cannot, a warning says so.
 3. Fresh legs judge. The fine-tuned model is saved only if on those of your
    spacecraft it makes no more wrong answers, has no larger log loss and no
    larger error of m* near the boundary than the default model; otherwise the

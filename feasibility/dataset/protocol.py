@@ -11,7 +11,7 @@ from feasibility.dataset.samplers.impulsive import ImpulsiveGrid
 from feasibility.dataset.samplers.make import NamedSampler
 from feasibility.dataset.samplers.protocol import Sampler
 from feasibility.errors import InputError
-from feasibility.legs import Spacecraft
+from feasibility.legs import Spacecraft, acceleration_fault
 from feasibility.runtime.toml_file import decode_toml, read_toml
 
 if TYPE_CHECKING:
@@ -33,13 +33,21 @@ class SpacecraftTable(_Table, frozen=True, kw_only=True):
     thrust_n: Annotated[float, Meta(gt=0)]
     isp_s: Annotated[float, Meta(gt=0)]
 
+    def __post_init__(self) -> None:
+        # Its checks are those of the values: a thrust in mN and the like.
+        self.craft()
+
+    def craft(self) -> Spacecraft:
+        """Return the spacecraft."""
+        return Spacecraft(m_dry=self.dry_mass_kg, thrust=self.thrust_n, isp=self.isp_s)
+
 
 @final
 class CatalogueTable(_Table, frozen=True, kw_only=True):
     """Table ``[catalogue]``: a file, or else a synthetic main belt."""
 
     file: str | None = None
-    synthetic_bodies: Annotated[int, Meta(ge=2)] = 16256
+    synthetic_bodies: Annotated[int, Meta(ge=2, le=10_000_000)] = 16256
     synthetic_seed: Annotated[int, Meta(ge=0)] = 0
 
 
@@ -82,7 +90,7 @@ class Protocol(_Table, frozen=True, kw_only=True):
     propellant: bool = True
     boundary_share: Annotated[float, Meta(ge=0, le=1)] = 0.0
     boundary_sigma: Annotated[float, Meta(gt=0)] = 0.05
-    legs_per_shard: Annotated[int, Meta(ge=1)] = 2000
+    legs_per_shard: Annotated[int, Meta(ge=1, le=1_000_000)] = 2000
     sampler: _Sampler
     spacecraft: SpacecraftTable | None = None
     catalogue: CatalogueTable = msgspec.field(default_factory=CatalogueTable)
@@ -100,13 +108,16 @@ class Protocol(_Table, frozen=True, kw_only=True):
                 f"sampler m0_kg begins at {self.sampler.m0_kg[0]:g}, below "
                 f"dry_mass_kg = {self.spacecraft.dry_mass_kg:g}"
             )
+        fault = acceleration_fault(self.spacecraft.thrust_n, self.sampler.m0_kg[0])
+        if fault is not None:
+            raise ValueError(f"thrust_n: {fault}")
 
     def craft(self) -> Spacecraft | None:
         """Return the one spacecraft, None where each leg has its own."""
         table = self.spacecraft
         if table is None:
             return None
-        return Spacecraft(m_dry=table.dry_mass_kg, thrust=table.thrust_n, isp=table.isp_s)
+        return table.craft()
 
     def with_catalogue(self, file: str) -> "Protocol":
         """Return the protocol with another catalogue file."""

@@ -17,6 +17,9 @@ LEAST_BALANCED_ACCURACY: Final = 0.99
 LEAST_WITHIN_15_PERCENT: Final = 0.97
 """A model is good enough from these shares on, where its pruner's recall is as asked."""
 
+EXIT_CODES: Final = {"good enough": 0, "retrain": 3, "too few legs": 4}
+"""Of the command, by verdict; 1 and 2 are failures of any command."""
+
 LEAST_OF_A_CLASS: Final = 50
 LEAST_NEAR: Final = 100
 """With fewer legs of a class, or within 15 % of the boundary, nothing is said."""
@@ -213,7 +216,7 @@ def judgement(
     if within_15_percent.of < LEAST_NEAR:
         few.append(f"{within_15_percent.of} legs near the boundary, {LEAST_NEAR} needed")
     if few:
-        few.append("give more --legs, or a wider m0_kg or [sampling]")
+        few.append(_advice([*sides, within_15_percent], legs=in_domain.of))
         return "too few legs", tuple(few)
     against = []
     if in_domain.value < LEAST_IN_DOMAIN:
@@ -229,6 +232,18 @@ def judgement(
     if recall.interval[1] < recall_asked:
         against.append(f"recall surely below {recall_asked:g}: at most {recall.interval[1]:.5f}")
     return ("retrain" if against else "good enough"), tuple(against)
+
+
+def _advice(counted: Sequence[Share], legs: int) -> str:
+    """Return how many legs are probably enough; each share needs as many as its class has."""
+    needed = (LEAST_OF_A_CLASS, LEAST_OF_A_CLASS, LEAST_NEAR)
+    missing = [share.of == 0 for share in counted]
+    if any(missing):
+        return "give more --legs, or a wider m0_kg or [sampling]: of one kind there was none"
+    factor = max(least / share.of for least, share in zip(needed, counted, strict=True))
+    # A quarter more: counts scatter.
+    enough = int(np.ceil(1.25 * factor * legs / 100.0)) * 100
+    return f"about {enough} legs are needed: give --legs {enough}, or a wider m0_kg or [sampling]"
 
 
 def _share(right: NDArray[np.bool_], among: NDArray[np.bool_]) -> Share:

@@ -27,6 +27,9 @@ FINE_TUNED, RECALIBRATED, UNCHANGED = "fine-tuned", "recalibrated", "unchanged"
 
 REPORT: Final = "report.json"
 
+LEAST_SHARE: Final = 0.02
+"""Of flyable legs, and of others, below which the legs teach little."""
+
 _FIRST_SEED: Final = 40_000
 """Away from the seeds of the default model's legs."""
 
@@ -185,6 +188,10 @@ def retrain(
     own_test, general_test = made[: len(test)], made[len(test)]
     learned = made[len(test) + 1 :]
 
+    rare = few_flyable([*own_test, *learned[:-1]])
+    if rare is not None:
+        say(f"warning: {rare}")
+
     recipe = MarginRecipe(
         epochs=settings.epochs,
         learning_rate=settings.learning_rate,
@@ -223,6 +230,26 @@ def retrain(
     write_json(folder / REPORT, report)
     checkpoint.unlink(missing_ok=True)
     return Retrained(artefact, choice, own, general)
+
+
+def few_flyable(datasets: Sequence[Dataset]) -> str | None:
+    """Return what is odd where hardly any leg can be flown, or hardly any cannot; else None.
+
+    A model learns the boundary from both sides of it.
+    """
+    flyable = sum(int(dataset.flyable.sum()) for dataset in datasets)
+    solved = sum(int(dataset.labelled.sum()) for dataset in datasets)
+    if flyable < LEAST_SHARE * solved or solved == 0:
+        return (
+            f"of {solved} solved legs {flyable} can be flown; expected a lighter m0_kg, more "
+            "thrust or longer tof_days, and thrust_n in N"
+        )
+    if solved - flyable < LEAST_SHARE * solved:
+        return (
+            f"of {solved} solved legs {solved - flyable} cannot be flown; expected a heavier "
+            "m0_kg or shorter tof_days"
+        )
+    return None
 
 
 def choose(own: Mapping[str, Mapping[str, float]]) -> str:

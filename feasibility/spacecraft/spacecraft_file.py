@@ -10,7 +10,9 @@ from feasibility.dataset.protocol import CatalogueTable, Protocol, SpacecraftTab
 from feasibility.dataset.samplers.draws import check_ranges
 from feasibility.dataset.samplers.random_pairs import RandomPairs
 from feasibility.dataset.samplers.search_candidates import SearchCandidates
-from feasibility.runtime.toml_file import read_toml
+from feasibility.errors import InputError
+from feasibility.legs import Spacecraft, acceleration_fault
+from feasibility.runtime.toml_file import convert_table, parse_toml, read_toml_text
 
 _Positive = Annotated[float, Meta(gt=0)]
 _Range = tuple[_Positive, _Positive]
@@ -18,10 +20,13 @@ _Share = Annotated[float, Meta(ge=0, le=1)]
 
 EXAMPLE: Final = """\
 name = "probe"                # of the datasets and of the report
+
+[spacecraft]                  # as in a problem's file
+wet_mass_kg = 2000.0
 dry_mass_kg = 800.0
 thrust_n = 0.3                # largest thrust
 isp_s = 3000.0
-m0_kg = [800.0, 2000.0]       # masses with which its legs begin
+m0_kg = [800.0, 2000.0]       # masses with which its legs begin (default: dry to wet mass)
 
 [sampling]                    # all of it may be left out; these are the defaults
 start_mjd = [58849.0, 73459.0]  # departures, 1 Jan 2020 to 1 Jan 2060
@@ -51,14 +56,52 @@ class Sampling(_Table, frozen=True, kw_only=True):
     start_mjd: _Range = (58849.0, 73459.0)
     search_share: _Share = 0.5
     tof_days: _Range = (40.0, 500.0)
-    neighbours: Annotated[int, Meta(ge=1)] = 60
+    neighbours: Annotated[int, Meta(ge=1, le=100_000)] = 60
     tof_ratio: _Range = (0.6, 2.4)
-    tof_days_max: _Positive = 1460.0
+    tof_days_max: Annotated[float, Meta(gt=0, le=1e5)] = 1460.0
     boundary_share: _Share = 0.5
     boundary_sigma: _Positive = 0.05
 
     def __post_init__(self) -> None:
         check_ranges(start_mjd=self.start_mjd, tof_days=self.tof_days, tof_ratio=self.tof_ratio)
+
+
+@final
+class _SpacecraftTable(_Table, frozen=True, kw_only=True):
+    """Table ``[spacecraft]``, which problem files have too, there without `m0_kg`."""
+
+    dry_mass_kg: Annotated[float, Meta(ge=0)]
+    thrust_n: _Positive
+    isp_s: _Positive
+    wet_mass_kg: _Positive | None = None
+    m0_kg: _Range | None = None
+
+    def __post_init__(self) -> None:
+        if self.wet_mass_kg is None and self.m0_kg is None:
+            raise ValueError("no key 'wet_mass_kg', expected one, or 'm0_kg'")
+        if self.wet_mass_kg is not None:
+            if self.wet_mass_kg <= self.dry_mass_kg:
+                raise ValueError(
+                    f"wet_mass_kg = {self.wet_mass_kg:g}, expected more than "
+                    f"dry_mass_kg = {self.dry_mass_kg:g}"
+                )
+            if self.m0_kg is not None and self.m0_kg[1] > self.wet_mass_kg:
+                raise ValueError(
+                    f"m0_kg ends at {self.m0_kg[1]:g}, above wet_mass_kg = {self.wet_mass_kg:g}"
+                )
+
+    def masses(self) -> _Range:
+        """Return the range of masses with which legs begin."""
+        if self.m0_kg is not None:
+            return self.m0_kg
+        assert self.wet_mass_kg is not None
+        return max(self.dry_mass_kg, _LEAST_SHARE * self.wet_mass_kg), self.wet_mass_kg
+
+
+_LEAST_SHARE: Final = 0.1
+"""Of the wet mass: the lightest that a leg begins with where there is no dry mass."""
+
+_CRAFT_KEYS: Final = {"dry_mass_kg", "thrust_n", "isp_s", "wet_mass_kg", "m0_kg"}
 
 
 @final
@@ -86,6 +129,11 @@ class SpacecraftFile(_Table, frozen=True, kw_only=True):
 
     def __post_init__(self) -> None:
         check_ranges(m0_kg=self.m0_kg)
+        # Its checks are those of the values: a thrust in mN and the like.
+        Spacecraft(self.dry_mass_kg, self.thrust_n, self.isp_s)
+        fault = acceleration_fault(self.thrust_n, self.m0_kg[0])
+        if fault is not None:
+            raise ValueError(f"thrust_n: {fault}")
         if self.m0_kg[0] < self.dry_mass_kg:
             raise ValueError(
                 f"m0_kg begins at {self.m0_kg[0]:g}, below dry_mass_kg = {self.dry_mass_kg:g}"
@@ -149,7 +197,7 @@ class SpacecraftFile(_Table, frozen=True, kw_only=True):
 
 
 def read_spacecraft(path: str | Path) -> SpacecraftFile:
-    """Read a spacecraft's TOML file.
+    """Read a spacecraft's TOML file: `EXAMPLE`, or the same keys without a table.
 
     Raises
     ------
@@ -157,4 +205,15 @@ def read_spacecraft(path: str | Path) -> SpacecraftFile:
         The file cannot be read, is not TOML, lacks a key, has an unknown one, or a
         value of the wrong type or range; the message names file and key.
     """
-    return read_toml(Path(path), SpacecraftFile)
+    label = str(path)
+    plain = parse_toml(read_toml_text(Path(path)), label)
+    if "spacecraft" in plain:
+        table = convert_table(plain.pop("spacecraft"), _SpacecraftTable, label, "spacecraft")
+        twice = sorted(_CRAFT_KEYS & plain.keys())
+        if twice:
+            raise InputError(
+                f"{label}: {twice[0]} at top level beside [spacecraft], expected it there"
+            )
+        plain |= {key: getattr(table, key) for key in ("dry_mass_kg", "thrust_n", "isp_s")}
+        plain["m0_kg"] = table.masses()
+    return convert_table(plain, SpacecraftFile, label)

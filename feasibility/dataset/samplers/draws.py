@@ -85,11 +85,29 @@ def check_pairs(catalogue: Catalogue) -> None:
         )
 
 
+_MOST: Final = {
+    "start_mjd": (200_000.0, "; is it a Julian date?"),
+    "m0_kg": (1e7, "; is it in g?"),
+    "tof_days": (1e5, "; is it in seconds?"),
+    "long_tof_days": (1e5, "; is it in seconds?"),
+    "tof_ratio": (1e3, ""),
+    "a_au": (1e3, "; is it in km?"),
+    "disturbance": (10.0, ""),
+    "revolutions": (100.0, ""),
+    "acceleration_m_s2": (0.01, ""),
+    "isp_s": (2e4, "; is it in m/s, an exhaust velocity?"),
+}
+"""Largest numbers of ranges, and what larger ones usually are."""
+
+
 def check_ranges(**ranges: tuple[float, float]) -> None:
-    """Raise ValueError where a pair of numbers is not in order."""
+    """Raise ValueError where a pair of numbers is not in order, or beyond all sense."""
     for name, (low, high) in ranges.items():
         if low > high:
             raise ValueError(f"{name} = [{low:g}, {high:g}], expected the smaller number first")
+        most, slip = _MOST.get(name, (np.inf, ""))
+        if high > most:
+            raise ValueError(f"{name} = [{low:g}, {high:g}], expected at most {most:g}{slip}")
 
 
 def legs_of_pairs(

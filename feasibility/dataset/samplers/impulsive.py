@@ -1,6 +1,6 @@
 """`ImpulsiveGrid`: the flight time at which the two-impulse transfer is cheapest."""
 
-from typing import Annotated, final
+from typing import Annotated, Final, final
 
 import msgspec
 import numpy as np
@@ -11,6 +11,8 @@ from feasibility.constants import DAY_S, MU_SUN
 from feasibility.orbits import Catalogue
 
 _Days = Annotated[float, Meta(gt=0)]
+
+_MAX_STEPS: Final = 100_000
 
 
 @final
@@ -40,6 +42,11 @@ class ImpulsiveGrid(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
             raise ValueError(
                 f"tof_days_max = {self.tof_days_max:g} is below "
                 f"tof_days_min = {self.tof_days_min:g}"
+            )
+        if self.tof_days_max > _MAX_STEPS * self.fine_step_days:
+            raise ValueError(
+                f"tof_days_max = {self.tof_days_max:g} in steps of {self.fine_step_days:g} days, "
+                f"expected at most {_MAX_STEPS}"
             )
         if self.fine_step_days > self.step_days:
             raise ValueError(

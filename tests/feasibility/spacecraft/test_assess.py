@@ -1,6 +1,7 @@
 """`feasibility assess`: shares with intervals, and a verdict by a stated rule."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from hypothesis import strategies as st
 from feasibility import ClassifierPruner, FeasibilityClassifier, InputError
 from feasibility.commands.cli import main
 from feasibility.dataset import Dataset
-from feasibility.spacecraft.assess import Share, assess, judgement
+from feasibility.spacecraft.assess import EXIT_CODES, Share, assess, judgement
 from tests.helpers.labelled import labelled_dataset
 
 GOOD = {
@@ -71,6 +72,25 @@ def test_the_verdict_follows_the_rule(change, verdict, reason):
     assert reason is None or reason in reasons[0]
 
 
+def test_too_few_legs_say_how_many_are_needed():
+    change = {"sides": [Share(20, 20), Share(400, 400)], "in_domain": Share(600, 600)}
+    _, reasons = judgement(**{**GOOD, **change})
+    # 50 of a class from 20 of 600, and a quarter more.
+    assert reasons[-1].startswith("about 1900 legs are needed: give --legs 1900")
+    _, reasons = judgement(**{**GOOD, "sides": [Share(0, 0), Share(400, 400)]})
+    assert "of one kind there was none" in reasons[-1]
+
+
+@pytest.mark.parametrize(
+    ("verdict", "code"), [("good enough", 0), ("retrain", 3), ("too few legs", 4)]
+)
+def test_each_verdict_has_an_exit_code_that_the_help_tells(verdict, code, capsys):
+    assert EXIT_CODES[verdict] == code
+    with pytest.raises(SystemExit):
+        main(["assess", "--help"])
+    assert f"{code} {verdict}" in capsys.readouterr().out
+
+
 def test_a_model_that_is_always_right_is_good_enough_and_one_that_errs_is_not(default):
     dataset = labelled_dataset()
     right = assess(default, [as_the_model_says(default, dataset)])
@@ -117,9 +137,10 @@ def test_the_command_solves_legs_and_says_its_verdict(tmp_path, capsys):
     file.write_text("dry_mass_kg = 800\nthrust_n = 0.3\nisp_s = 3000\nm0_kg = [800, 2000]\n")
     out = tmp_path / "figures.json"
     words = ["assess", str(file), "--legs", "30", "--workers", "1", "--out", str(out)]
-    assert main(words) == 0
+    assert main(words) == EXIT_CODES["too few legs"] == 4
     text = capsys.readouterr().out
     assert "verdict: too few legs" in text
+    assert re.search(r"about \d+00 legs are needed|of one kind there was none", text)
     record = json.loads(out.read_text())
     assert record["in_domain"]["of"] + record["unsolved"] == 30
     assert record["spacecraft"]["thrust_n"] == 0.3

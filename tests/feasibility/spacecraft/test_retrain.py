@@ -1,6 +1,7 @@
 """`feasibility retrain`: never worse, resumable, honest about what it did."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from feasibility.spacecraft.retrain import (
     UNCHANGED,
     RetrainSettings,
     choose,
+    few_flyable,
     joined,
     retrain,
 )
@@ -87,6 +89,31 @@ def test_what_is_learned_from_bad_legs_is_not_saved(start, legs_without_solving,
     for name in ("model/weight_0", "model/bias_1", "quick/weight_1"):
         np.testing.assert_array_equal(done.artefact.arrays[name], start.arrays[name])
     assert "fine-tuned model is saved" not in done.verdict()
+
+
+def scaled(dataset, factor):
+    """Return the legs with masses m* times a factor."""
+    m_star = dataset.columns["m_star_kg"] * factor
+    columns = {**dataset.columns, "m_star_kg": m_star}
+    columns["log_margin"] = np.log(m_star / columns["m0_kg"])
+    return Dataset(columns, dataset.metadata)
+
+
+def test_a_spacecraft_with_hardly_a_leg_to_fly_is_told():
+    dataset = labelled_dataset(seed=4)
+    assert few_flyable([dataset]) is None
+    assert re.match(r"of 1500 solved legs \d+ can be flown", few_flyable([scaled(dataset, 0.01)]))
+    assert re.match(r"of 1500 solved legs 0 cannot be flown", few_flyable([scaled(dataset, 1e3)]))
+
+
+def test_the_warning_is_said_before_the_training(
+    start, legs_without_solving, tmp_path, monkeypatch
+):
+    legs_without_solving(labelled_dataset(seed=4))
+    monkeypatch.setattr(module, "few_flyable", lambda _: "hardly a leg")
+    said = []
+    retrain(CRAFT, [], start, tmp_path, SMALL, say=said.append)
+    assert said.index("warning: hardly a leg") < said.index("fine-tuning")
 
 
 def test_a_new_calibration_keeps_the_nets(start):
