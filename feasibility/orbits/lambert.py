@@ -5,6 +5,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from feasibility.constants import MU_SUN
 from feasibility.errors import InputError
+from feasibility.orbits.transfer_plane import along_departure, off_singular
 
 
 def lambert(
@@ -74,6 +75,9 @@ def lambert_delta_v(
 ) -> NDArray[np.float64]:
     """Return the least sum of both impulses over all branches.
 
+    The arcs go round as the departure orbit does, be it prograde or retrograde. Where the
+    positions are exactly at 0 or 180 degrees the arcs lie in the plane of the departure orbit.
+
     Parameters
     ----------
     rv_dep, rv_arr : array_like
@@ -97,6 +101,8 @@ def lambert_delta_v(
     """
     start, end = _vectors("rv_dep", rv_dep, 6), _vectors("rv_arr", rv_arr, 6)
     times = np.full(len(start), tof_s) if np.ndim(tof_s) == 0 else tof_s
+    if len(start) == len(end):
+        start, end = along_departure(start, off_singular(start, end))
     v1, v2 = lambert(start[:, :3], end[:, :3], times, max_revs, mu)
     impulses = np.linalg.norm(v1 - start[:, None, 3:], axis=2)
     impulses += np.linalg.norm(end[:, None, 3:] - v2, axis=2)

@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from feasibility.constants import MU_SUN
 from feasibility.errors import InputError
+from feasibility.orbits.transfer_plane import along_departure, off_singular
 
 
 def mima(
@@ -20,6 +21,9 @@ def mima(
     mu: float = MU_SUN,
 ) -> NDArray[np.float64]:
     """Return the Maximum Initial Mass Approximation on the best Lambert branch.
+
+    Arcs go round as the departure orbit does, be it prograde or retrograde. Where the positions
+    are exactly at 0 or 180 degrees they lie in the plane of the departure orbit.
 
     Parameters
     ----------
@@ -129,10 +133,12 @@ def _masses(
         raise InputError(f"mima: rv_dep has {n} rows, rv_arr has {len(end)}")
     if max_revs < 0:
         raise InputError(f"mima: max_revs is {max_revs}, expected zero or more")
+    times = _column("tof_s", tof_s, n)
+    start, end = along_departure(start, off_singular(start, end))
     return maximum_mass_batch(
         start,
         end,
-        _column("tof_s", tof_s, n),
+        times,
         _column("thrust", thrust, n),
         _column("exhaust_velocity", exhaust_velocity, n),
         int(max_revs),

@@ -6,9 +6,11 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
+from feasibility.constants import MU_SUN
 from feasibility.errors import InputError
 from feasibility.legs import Legs
 from feasibility.orbits.lambert import lambert_delta_v
+from feasibility.orbits.transfer_plane import in_line, levelled_targets
 
 
 @final
@@ -22,13 +24,19 @@ class LambertPruner:
     on its best Lambert branch is at most `factor` times that, and where the
     propellant for this sum leaves at least the dry mass.
 
+    Arcs go round as the departure orbit does, be it prograde or retrograde. Where the plane
+    through both positions misleads (exactly at 0 or 180 degrees, or within 10 degrees of
+    them and tilted by more than 30), the target is turned into the plane of the departure
+    orbit, and the turn out of it costs nothing: such legs are rather kept. So are those exactly
+    at 0 degrees, of which Lambert's arcs say nothing.
+
     Parameters
     ----------
     factor : float
         Largest ratio of Lambert delta-v to available delta-v. Impulses cost less
-        than low thrust on short legs, so 1 is generous there; near 0 and 180
-        degrees, where Lambert's plane is singular, they cost far more, and
-        legs that can be flown are lost at any factor near 1.
+        than low thrust on short legs, so 1 is generous there; within some 10 degrees
+        of 0 and 180, where Lambert's plane is tilted against the orbits, they cost
+        more, and legs that can be flown are lost at any factor near 1.
     max_revs : int
         Largest number of complete revolutions of a Lambert arc.
 
@@ -59,13 +67,13 @@ class LambertPruner:
 
     def keep(self, legs: Legs, /) -> NDArray[np.bool_]:
         """Return (n,) bool, True where the leg survives."""
-        needed = lambert_delta_v(legs.rv_dep, legs.rv_arr, legs.tof_s, self.max_revs)
+        rv_arr = levelled_targets(legs.rv_dep, legs.rv_arr, legs.tof_s, MU_SUN)
+        needed = lambert_delta_v(legs.rv_dep, rv_arr, legs.tof_s, self.max_revs)
         burnt = legs.thrust * legs.tof_s / (legs.exhaust_velocity * legs.m0)
         available = np.full(len(legs), np.inf)
         limited = burnt < 1.0
         available[limited] = -legs.exhaust_velocity[limited] * np.log1p(-burnt[limited])
         final_mass = legs.m0 * np.exp(-needed / legs.exhaust_velocity)
         # Where no arc exists the need is infinite, and so may be the supply.
-        return (
-            np.isfinite(needed) & (needed <= self.factor * available) & (final_mass >= legs.m_dry)
-        )
+        within = np.isfinite(needed) & (needed <= self.factor * available)
+        return (within & (final_mass >= legs.m_dry)) | in_line(legs.rv_dep, legs.rv_arr)

@@ -7,9 +7,11 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
+from feasibility.constants import MU_SUN
 from feasibility.errors import InputError
 from feasibility.legs import Legs
 from feasibility.orbits.mima import mima, mima2
+from feasibility.orbits.transfer_plane import in_line, levelled_targets
 
 
 @dataclass(frozen=True)
@@ -27,12 +29,14 @@ class _LargestMassPruner(ABC):
             raise InputError(f"{kind} max_revs: {self.max_revs}, expected zero or more")
 
     @abstractmethod
-    def _largest_mass(self, legs: Legs) -> NDArray[np.float64]:
-        """Return the estimate, (n,) kg."""
+    def _largest_mass(self, legs: Legs, rv_arr: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the estimate, (n,) kg, for the arrival states `rv_arr`."""
 
     def keep(self, legs: Legs, /) -> NDArray[np.bool_]:
         """Return (n,) bool, True where the leg survives."""
-        return self._largest_mass(legs) >= self.margin * legs.m0
+        rv_arr = levelled_targets(legs.rv_dep, legs.rv_arr, legs.tof_s, MU_SUN)
+        enough = self._largest_mass(legs, rv_arr) >= self.margin * legs.m0
+        return enough | in_line(legs.rv_dep, legs.rv_arr)
 
 
 @final
@@ -55,7 +59,10 @@ class MimaPruner(_LargestMassPruner):
 
     Notes
     -----
-    See `feasibility.orbits.mima` for the approximation and its source.
+    See `feasibility.orbits.mima` for the approximation and its source. Retrograde legs are
+    judged as their prograde mirror images are. Near 0 and 180 degrees, where the plane
+    through both positions misleads, the plane of the departure orbit is taken and the turn
+    out of it neglected: such legs are rather kept, and always exactly at 0 degrees.
 
     Examples
     --------
@@ -68,9 +75,9 @@ class MimaPruner(_LargestMassPruner):
         """Name in counters and reports."""
         return "mima"
 
-    def _largest_mass(self, legs: Legs) -> NDArray[np.float64]:
+    def _largest_mass(self, legs: Legs, rv_arr: NDArray[np.float64]) -> NDArray[np.float64]:
         return mima(
-            legs.rv_dep, legs.rv_arr, legs.tof_s, legs.thrust, legs.exhaust_velocity, self.max_revs
+            legs.rv_dep, rv_arr, legs.tof_s, legs.thrust, legs.exhaust_velocity, self.max_revs
         )
 
 
@@ -79,7 +86,7 @@ class MimaPruner(_LargestMassPruner):
 class Mima2Pruner(_LargestMassPruner):
     """Keeps a leg whose MIMA2, which follows gravity along the arc, is at least `margin` times m0.
 
-    Parameters, errors and source as for `MimaPruner`.
+    Parameters, errors, source and what is said of planes as for `MimaPruner`.
 
     Examples
     --------
@@ -92,7 +99,7 @@ class Mima2Pruner(_LargestMassPruner):
         """Name in counters and reports."""
         return "mima2"
 
-    def _largest_mass(self, legs: Legs) -> NDArray[np.float64]:
+    def _largest_mass(self, legs: Legs, rv_arr: NDArray[np.float64]) -> NDArray[np.float64]:
         return mima2(
-            legs.rv_dep, legs.rv_arr, legs.tof_s, legs.thrust, legs.exhaust_velocity, self.max_revs
+            legs.rv_dep, rv_arr, legs.tof_s, legs.thrust, legs.exhaust_velocity, self.max_revs
         )

@@ -120,7 +120,7 @@ def test_the_velocity_change_of_a_coasting_leg_is_zero():
 
 
 def test_the_velocity_change_is_the_least_sum_of_both_impulses_and_infinite_without_a_branch():
-    rv_dep = np.array([[1, 0, 0, 0, 1, 0.1], [1, 0, 0, 0, 1, 0]])
+    rv_dep = np.array([[1, 0, 0, 0, 1, 0.1], [1, 0, 0, 1, 0, 0]])
     rv_arr = np.array([[0, 2, 0.1, -0.7, 0, 0], [-2, 0, 0, 0, -0.7, 0]])
     v1, v2 = lambert(rv_dep[:, :3], rv_arr[:, :3], [40.0, 40.0], 2, mu=1.0)
     sums = np.linalg.norm(v1[0] - rv_dep[0, 3:], axis=1)

@@ -71,7 +71,8 @@ def test_best_branch_is_the_largest_and_a_missing_one_counts_as_zero():
     for best, branches in ((mima, mima_branches), (mima2, mima2_branches)):
         np.testing.assert_array_equal(best(*arguments), np.nanmax(branches(*arguments), axis=1))
         assert (best(*arguments) >= best(*arguments, max_revs=0)).all()
-    opposite = np.array([[2 * AU, 0, 0, 0, 2e4, 0], [-2 * AU, 0, 0, 0, -2e4, 0]])
+    # Straight up, towards the opposite side: not even the departure orbit has a plane.
+    opposite = np.array([[2 * AU, 0, 0, 2e4, 0, 0], [-2 * AU, 0, 0, 0, -2e4, 0]])
     for best in (mima, mima2):
         assert best(opposite[:1], opposite[1:], [200 * DAY_S], 0.3, 3e4)[0] == 0.0
     assert np.isinf(lambert_delta_v(opposite[:1], opposite[1:], [200 * DAY_S])[0])
