@@ -23,7 +23,7 @@ if TYPE_CHECKING:
         Pruner,
         check_pruner,
     )
-    from feasibility.sims_flanagan import LegSolutions, max_initial_mass, optimise
+    from feasibility.sims_flanagan import LegSolutions, impulses, max_initial_mass, optimise
 
 __version__ = "0.1.0"
 
@@ -39,6 +39,7 @@ _HOMES = {
     "check_predictor": "feasibility.classifier.check",
     "check_pruner": "feasibility.pruners",
     "LegSolutions": "feasibility.sims_flanagan",
+    "impulses": "feasibility.sims_flanagan",
     "max_initial_mass": "feasibility.sims_flanagan",
     "optimise": "feasibility.sims_flanagan",
 }
@@ -59,6 +60,7 @@ __all__ = [
     "Spacecraft",
     "check_predictor",
     "check_pruner",
+    "impulses",
     "max_initial_mass",
     "optimise",
 ]

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from feasibility.constants import AU, DAY_S, G0, MU_SUN, YEAR_DAYS
 from feasibility.errors import InputError
+from feasibility.quantities import plain_numbers
 
 _MIN_RADIUS_M = 0.01 * AU
 _AU_SLIP_M = 1e6
@@ -20,12 +21,31 @@ _MAX_TOF_DAYS = 1e5
 _MAX_THRUST_N = 1e3
 _MAX_ISP_S = 2e4
 _MAX_MASS_KG = 1e7
+_MAX_ACCELERATION = 0.01
+"""m/s2: electric spacecraft have 1e-5 to 1e-3, so that a thrust in mN is found."""
+_MAX_DRY_ACCELERATION = 0.02
+"""m/s2, of the dry mass alone: legs are flown with more."""
+_SURELY_MILLINEWTON = 10.0
+
+_UNITS = {
+    "rv_dep": ("m", "m", "m", "m/s", "m/s", "m/s"),
+    "rv_arr": ("m", "m", "m", "m/s", "m/s", "m/s"),
+    "tof_days": ("day",),
+    "m0": ("kg",),
+    "thrust": ("N",),
+    "isp": ("s",),
+    "m_dry": ("kg",),
+    "t_dep_mjd2000": ("day",),
+}
+"""What quantities with units are converted to; ids have none."""
 
 
 @final
 @dataclass(frozen=True)
 class Spacecraft:
     """A spacecraft with electric propulsion at constant thrust and specific impulse.
+
+    Quantities with units (astropy, pint) are converted.
 
     Parameters
     ----------
@@ -39,7 +59,8 @@ class Spacecraft:
     Raises
     ------
     InputError
-        A value is no number, not finite, not positive, or evidently in another unit.
+        A value is no number, not finite, not positive, or evidently in another unit, such as a
+        thrust in mN: it would accelerate the dry mass by more than 0.02 m/s2.
 
     Examples
     --------
@@ -54,16 +75,22 @@ class Spacecraft:
 
     def __post_init__(self) -> None:
         for name in ("m_dry", "thrust", "isp"):
+            label = f"Spacecraft {name}"
             try:
-                value = np.asarray(getattr(self, name), dtype=float)
+                plain = plain_numbers(label, getattr(self, name), _UNITS[name])
+                value = np.asarray(plain, dtype=float)
             except (TypeError, ValueError) as error:
-                raise InputError(f"Spacecraft {name}: expected a number ({error})") from None
+                if isinstance(error, InputError):
+                    raise
+                raise InputError(f"{label}: expected a number ({error})") from None
             if value.ndim:
-                raise InputError(
-                    f"Spacecraft {name}: expected one number, got shape {value.shape}"
-                )
-            _check_scalar_column(f"Spacecraft {name}", value.reshape(1), name)
+                raise InputError(f"{label}: expected one number, got shape {value.shape}")
+            _check_scalar_column(label, value.reshape(1), name)
             object.__setattr__(self, name, float(value))
+        if self.m_dry > 0.0:
+            fault = acceleration_fault(self.thrust, self.m_dry, _MAX_DRY_ACCELERATION)
+            if fault is not None:
+                raise InputError(f"Spacecraft thrust: {fault}")
 
     @property
     def exhaust_velocity(self) -> float:
@@ -77,7 +104,8 @@ class Legs:
     """Many legs as a frozen struct of arrays, one row a leg.
 
     With n the number of legs; scalars and single rows are broadcast to n.
-    Arrays are copied once, validated once and made read-only.
+    Arrays are copied once, validated once and made read-only. Quantities with units (astropy,
+    pint) are converted; of states, which have two units, only rows of single quantities are.
 
     Parameters
     ----------
@@ -105,8 +133,8 @@ class Legs:
     InputError
         A shape does not fit, a value is not finite or not positive, or a
         column is evidently in another unit (a position in AU or km, a
-        velocity in km/s, a time in seconds, a thrust in mN). The message names
-        the column and the first bad row.
+        velocity in km/s, a time in seconds, a thrust in mN: one that accelerates
+        m0 by more than 0.01 m/s2). The message names the column and the first bad row.
 
     Examples
     --------
@@ -161,8 +189,11 @@ class Legs:
             "dep_id": dep_id,
             "arr_id": arr_id,
         }
+        optional = ("t_dep_mjd2000", "dep_id", "arr_id")
         arrays = {
-            name: _as_array(name, value) for name, value in given.items() if value is not None
+            name: _as_array(name, value)
+            for name, value in given.items()
+            if value is not None or name not in optional
         }
         n = _common_length(arrays)
         for name in given:
@@ -253,6 +284,7 @@ class Legs:
         for name in ("tof_days", "thrust", "isp"):
             _check_scalar_column(f"Legs {name}", getattr(self, name), name)
         self._validate_masses()
+        self._validate_acceleration()
         if self.t_dep_mjd2000 is not None:
             _check_finite("Legs t_dep_mjd2000", self.t_dep_mjd2000)
 
@@ -267,12 +299,46 @@ class Legs:
                 f"{self.m_dry[row]:g} kg"
             )
 
+    def _validate_acceleration(self) -> None:
+        bad = self.thrust > _MAX_ACCELERATION * self.m0
+        if bad.any():
+            row = int(np.argmax(bad))
+            fault = acceleration_fault(self.thrust[row], self.m0[row])
+            raise InputError(f"Legs thrust, row {row}: {fault}")
 
-def _as_array(name: str, value: ArrayLike) -> NDArray[Any]:
+
+def acceleration_fault(
+    thrust_n: float, mass_kg: float, most: float = _MAX_ACCELERATION
+) -> str | None:
+    """Return what is wrong with a thrust on a mass, None if it accelerates as electric ones do.
+
+    Parameters
+    ----------
+    thrust_n, mass_kg : float
+        The thrust in N and the mass, more than zero, in kg.
+    most : float
+        Largest acceleration in m/s2.
+    """
+    if thrust_n <= most * mass_kg:
+        return None
+    # A small thrust may be right, and the mass be in tonnes.
+    sure = thrust_n >= _SURELY_MILLINEWTON
+    slip = "is it in mN?" if sure else "is the thrust in mN, or the mass in t?"
+    return (
+        f"{thrust_n:g} N on {mass_kg:g} kg is {thrust_n / mass_kg:.2g} m/s2, "
+        f"expected at most {most:g} m/s2; {slip}"
+    )
+
+
+def _as_array(name: str, value: ArrayLike | None) -> NDArray[Any]:
+    label = f"Legs {name}"
+    if value is None:
+        raise InputError(f"{label}: is None; expected numbers")
+    plain = plain_numbers(label, value, _UNITS.get(name, ()))
     dtype = np.int64 if name in ("dep_id", "arr_id") else np.float64
     try:
-        array = np.array(value, dtype=dtype)
-    except (TypeError, ValueError) as error:
+        array = np.array(plain, dtype=dtype)
+    except (TypeError, ValueError, OverflowError) as error:
         raise InputError(f"Legs {name}: expected numbers ({error})") from None
     if name in ("rv_dep", "rv_arr"):
         if array.ndim == 1:

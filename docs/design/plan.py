@@ -28,6 +28,7 @@ FLOORS = {
         {"orbits": "Kepler, elements, Lambert, MIMA, catalogues, neighbours"},
         {"legs": "Legs and Spacecraft, the one thing that all parts exchange"},
         {"runtime": "files, processes, kernels, TOML, the guarded import of pykep"},
+        {"quantities": "numbers that carry units"},
         {"constants": "units", "errors": "InputError", "arrays": "structs of arrays"},
     ],
 }

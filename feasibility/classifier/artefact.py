@@ -15,6 +15,7 @@ named by section:
 import hashlib
 import io
 import json
+import math
 import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -33,6 +34,13 @@ SUFFIX: Final = ".seqmodel"
 FORMAT: Final = "seqsearch-model"
 FORMAT_VERSION: Final = 1
 """A reader understands files up to its own version."""
+
+_MAX_BYTES: Final = 256 << 20
+"""Of an unpacked model: a file from elsewhere may be made to unpack to any size."""
+
+_MAX_MEMBERS: Final = 1000
+_KINDS: Final = "biufU"
+"""Kinds of arrays that a model may have: numbers and words."""
 
 _MANIFEST: Final = "manifest.json"
 _DIGEST: Final = "manifest.sha256"
@@ -122,7 +130,8 @@ class Artefact:
         Raises
         ------
         InputError
-            No such file, not a model, damaged or changed, or written by a newer version.
+            No such file, not a model, damaged or changed, written by a newer version, or too
+            large when unpacked.
         """
         try:
             with zipfile.ZipFile(path) as archive:
@@ -140,32 +149,40 @@ class Artefact:
 
 
 def _read(archive: zipfile.ZipFile, path: Path) -> Artefact:
-    text = archive.read(_MANIFEST)
+    members = archive.infolist()
+    size = sum(member.file_size for member in members)
+    if size > _MAX_BYTES or len(members) > _MAX_MEMBERS:
+        raise InputError(
+            f"{path}: {len(members)} members of {size >> 20} MiB, expected a model of at most "
+            f"{_MAX_MEMBERS} and {_MAX_BYTES >> 20} MiB"
+        )
+    text = _content(archive, _MANIFEST)
     try:
         manifest = json.loads(text)
     except ValueError:
         raise InputError(f"{path}: damaged or changed: {_MANIFEST} is not JSON") from None
-    if manifest["format"] != FORMAT:
-        raise InputError(f"{path}: not a model file: its format is {manifest['format']!r}")
-    version = manifest["format_version"]
+    if not isinstance(manifest, dict) or manifest.get("format") != FORMAT:
+        raise InputError(f"{path}: not a model file, or damaged: {_MANIFEST} of another format")
+    version = manifest.get("format_version")
+    if not isinstance(version, int) or version < 1:
+        raise InputError(f"{path}: not a model file: format version {version!r:.40}")
     if version > FORMAT_VERSION:
         raise InputError(
             f"{path}: has format version {version}, this program reads up to {FORMAT_VERSION}; "
             "expected an older file, or upgrade seqsearch"
         )
-    if archive.read(_DIGEST).decode("ascii", "replace") != _sha256(text):
+    if _content(archive, _DIGEST).decode("ascii", "replace") != _sha256(text):
         raise InputError(f"{path}: damaged or changed: {_MANIFEST} does not match its checksum")
+    _check_manifest(manifest, path)
     arrays = {}
     for name, digest in manifest["arrays"].items():
-        content = archive.read(f"{name}.npy")
+        content = _content(archive, f"{name}.npy")
         if _sha256(content) != digest:
             raise InputError(f"{path}: damaged or changed: {name} does not match its checksum")
         try:
-            array = np.load(io.BytesIO(content), allow_pickle=False)
+            arrays[name] = _array(content)
         except ValueError as error:
             raise InputError(f"{path}: {name}: not an array ({error})") from None
-        array.flags.writeable = False
-        arrays[name] = array
     return Artefact(
         kind=manifest["kind"],
         feature_set=manifest["feature_set"],
@@ -176,6 +193,70 @@ def _read(archive: zipfile.ZipFile, path: Path) -> Artefact:
         metrics=manifest["metrics"],
         provenance=manifest["provenance"],
     )
+
+
+def _content(archive: zipfile.ZipFile, name: str) -> bytes:
+    """Return a member, of which no more is unpacked than the archive says that there is."""
+    size = archive.getinfo(name).file_size
+    with archive.open(name) as member:
+        return member.read(size + 1)
+
+
+def _check_manifest(manifest: dict[str, Any], path: Path) -> None:
+    """Check the types of what the manifest says.
+
+    Raises
+    ------
+    InputError
+        An entry is missing or of another type.
+    """
+    kinds = {
+        "kind": str,
+        "feature_set": str,
+        "features": list,
+        "units": list,
+        "arrays": dict,
+        "config": dict,
+        "metrics": dict,
+        "provenance": dict,
+    }
+    for name, kind in kinds.items():
+        if not isinstance(manifest.get(name), kind):
+            raise InputError(f"{path}: {_MANIFEST}: no {name}, expected one")
+    words = [*manifest["features"], *manifest["units"], *manifest["arrays"].values()]
+    if not all(isinstance(word, str) for word in words):
+        raise InputError(f"{path}: {_MANIFEST}: features, units and checksums, expected words")
+    if len(manifest["features"]) != len(manifest["units"]):
+        raise InputError(
+            f"{path}: {_MANIFEST}: {len(manifest['features'])} features and "
+            f"{len(manifest['units'])} units, expected as many"
+        )
+
+
+def _array(content: bytes) -> NDArray[Any]:
+    """Return a ``.npy``, read-only; nothing is allocated before its header is known to be true.
+
+    Raises
+    ------
+    ValueError
+        It is no array of numbers or words, its size is another than its header says, or it has
+        numbers that are not finite.
+    """
+    stream = io.BytesIO(content)
+    if np.lib.format.read_magic(stream) != (1, 0):
+        raise ValueError("another version than 1.0")
+    shape, _, dtype = np.lib.format.read_array_header_1_0(stream)
+    if dtype.kind not in _KINDS:
+        raise ValueError(f"of type {dtype}")
+    if min(shape, default=0) < 0 or (
+        math.prod(shape) * dtype.itemsize != len(content) - stream.tell()
+    ):
+        raise ValueError(f"shape {shape} does not fit its size")
+    array = np.load(io.BytesIO(content), allow_pickle=False)
+    if dtype.kind == "f" and not np.isfinite(array).all():
+        raise ValueError("numbers that are not finite")
+    array.flags.writeable = False
+    return np.asarray(array)
 
 
 def _npy(array: NDArray[Any]) -> bytes:

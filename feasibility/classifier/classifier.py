@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from feasibility.classifier.artefact import Artefact
 from feasibility.classifier.margin.estimator import MarginEstimator
 from feasibility.classifier.margin.prediction import LegPrediction
+from feasibility.classifier.model_check import check_model
 from feasibility.classifier.paper import features as paper
 from feasibility.classifier.paper.estimator import PaperEstimator
 from feasibility.errors import InputError
@@ -80,10 +81,16 @@ class FeasibilityClassifier:
         Raises
         ------
         InputError
-            No such file, damaged or changed, or written by a newer version.
+            No such file, damaged or changed, written by a newer version, or with arrays that do
+            not fit together.
         """
         if path != DEFAULT:
-            return cls(Artefact.load(Path(path)))
+            artefact = Artefact.load(Path(path))
+            try:
+                check_model(artefact)
+                return cls(artefact)
+            except InputError as error:
+                raise InputError(f"{path}: {error}") from None
         with resources.as_file(
             resources.files("feasibility.classifier") / "default.seqmodel"
         ) as f:

@@ -10,7 +10,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from feasibility.dataset.columns import ARRIVAL_STATE, DEPARTURE_STATE
-from feasibility.dataset.storage import read_metadata, read_shard, shard_path, shard_sizes
+from feasibility.dataset.storage import (
+    CHECKSUMS,
+    read_metadata,
+    read_shard,
+    shard_path,
+    shard_sizes,
+)
 from feasibility.errors import InputError
 from feasibility.legs import Legs
 from feasibility.sims_flanagan import Status
@@ -106,7 +112,7 @@ def read_dataset(folder: str | Path) -> Dataset:
     Raises
     ------
     InputError
-        No dataset there, written by another version, a shard missing or damaged.
+        No dataset there, written by another version, a shard missing, damaged or changed.
     MissingDependencyError
         pyarrow is not installed.
     """
@@ -119,7 +125,11 @@ def read_dataset(folder: str | Path) -> Dataset:
             f"{shard_path(path, missing[0])}: missing, as {len(missing)} of {len(sizes)} are; "
             "feasibility generate with the same settings completes the dataset"
         )
-    shards = [read_shard(shard_path(path, shard), rows) for shard, rows in enumerate(sizes)]
+    checksums = metadata.get("checksums") == CHECKSUMS
+    shards = [
+        read_shard(shard_path(path, shard), rows, checksums=checksums)
+        for shard, rows in enumerate(sizes)
+    ]
     columns = {name: np.concatenate([part[name] for part in shards]) for name in shards[0]}
     return Dataset(_frozen(columns), metadata)
 

@@ -3,7 +3,7 @@
 import os
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final, final
 
@@ -11,6 +11,7 @@ from feasibility.dataset.labels import ShardTask, file_sha256, load_catalogue, m
 from feasibility.dataset.protocol import Protocol
 from feasibility.dataset.samplers.draws import Columns
 from feasibility.dataset.storage import (
+    CHECKSUMS,
     METADATA,
     has_shard,
     names_only,
@@ -22,6 +23,7 @@ from feasibility.dataset.storage import (
     write_shard,
 )
 from feasibility.errors import InputError
+from feasibility.runtime.locks import folder_lock
 from feasibility.runtime.provenance import provenance
 
 _RECIPE: Final = ("protocol", "seed", "catalogue")
@@ -74,12 +76,15 @@ class Generation:
         Raises
         ------
         InputError
-            The folder cannot be written to, the disk is full, or the catalogue
-            cannot be used by a worker. Shards written before are intact.
+            The folder cannot be written to or is in use by another process, the disk is full,
+            or the catalogue cannot be used by a worker. Shards written before are intact.
         """
-        for task, columns in _results(self.tasks, executor, in_flight):
-            write_shard(shard_path(self.folder, task.shard), columns)
-            on_shard(task.rows)
+        if not self.tasks:
+            return
+        with folder_lock(self.folder):
+            for task, columns in _results(self.tasks, executor, in_flight):
+                write_shard(shard_path(self.folder, task.shard), columns)
+                on_shard(task.rows)
 
 
 def begin(protocol: Protocol, legs: int, folder: Path, *, seed: int = 0) -> Generation:
@@ -102,8 +107,8 @@ def begin(protocol: Protocol, legs: int, folder: Path, *, seed: int = 0) -> Gene
     Raises
     ------
     InputError
-        A number out of range, a catalogue that cannot be used, a folder that
-        holds something else or was begun with other settings, or cannot be written.
+        A number out of range, a catalogue that cannot be used, a folder that holds something
+        else, was begun with other settings, is in use by another process, or cannot be written.
     MissingDependencyError
         pyarrow is not installed.
     """
@@ -120,26 +125,39 @@ def begin(protocol: Protocol, legs: int, folder: Path, *, seed: int = 0) -> Gene
     }
     # The digest tells the file; its folder is this machine's affair.
     recipe = names_only(recipe)
-    sessions = _open_folder(folder, recipe, legs)
+    _make_folder(folder)
+    with folder_lock(folder):
+        return _begun(folder, protocol, legs, recipe, ShardTask(protocol, seed, 0, 0, sha256))
+
+
+def _begun(
+    folder: Path, protocol: Protocol, legs: int, recipe: Mapping[str, Any], first: ShardTask
+) -> Generation:
+    """Return what is to be done in a folder that this process holds."""
+    known = _known_dataset(folder, recipe, legs)
+    # What older versions wrote has no checksums, and may be completed.
+    checksums = {} if known is not None and "checksums" not in known else {"checksums": CHECKSUMS}
+    sessions = [] if known is None else list(known["sessions"])
     record = {
         "legs": legs,
         "legs_per_shard": protocol.legs_per_shard,
+        **checksums,
         **recipe,
         "sessions": [*sessions, provenance()],
     }
     sizes = shard_sizes(legs, protocol.legs_per_shard)
     tasks = tuple(
-        ShardTask(protocol=protocol, seed=seed, shard=shard, rows=rows, catalogue_sha256=sha256)
+        replace(first, shard=shard, rows=rows)
         for shard, rows in enumerate(sizes)
         if not has_shard(shard_path(folder, shard), rows)
     )
-    if tasks or not sessions:
+    if tasks or known is None:
         write_metadata(folder, record)
     return Generation(folder=folder, tasks=tasks, legs=legs)
 
 
-def _open_folder(folder: Path, recipe: Mapping[str, Any], legs: int) -> list[Any]:
-    """Make the folder, or check that it was begun with the same settings; return its sessions."""
+def _make_folder(folder: Path) -> None:
+    """Make the folder, or check that it is empty or holds a dataset, and can be written to."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         empty = not any(path.name[0] != "." for path in folder.iterdir())
@@ -147,10 +165,14 @@ def _open_folder(folder: Path, recipe: Mapping[str, Any], legs: int) -> list[Any
         raise InputError(f"{folder}: cannot be used as a folder ({error.strerror})") from None
     if not os.access(folder, os.W_OK | os.X_OK):
         raise InputError(f"{folder}: cannot be written to")
-    if empty:
-        return []
-    if not (folder / METADATA).exists():
+    if not empty and not (folder / METADATA).exists():
         raise InputError(f"{folder}: is not empty and holds no dataset; choose another --out")
+
+
+def _known_dataset(folder: Path, recipe: Mapping[str, Any], legs: int) -> dict[str, Any] | None:
+    """Return the metadata of a dataset begun with the same settings, None in an empty folder."""
+    if not (folder / METADATA).exists():
+        return None
     known = read_metadata(folder)
     for key in _RECIPE:
         _check_same(folder, key, known.get(key), recipe[key])
@@ -159,7 +181,7 @@ def _open_folder(folder: Path, recipe: Mapping[str, Any], legs: int) -> list[Any
             f"{folder}: was begun with --legs {known['legs']}, expected no fewer, got {legs}"
         )
     remove_leftovers(folder)
-    return list(known["sessions"])
+    return known
 
 
 def _check_same(folder: Path, key: str, old: Any, new: Any) -> None:

@@ -1,126 +1,91 @@
-"""Readers of the asteroid tables of the GTOC problems.
+"""Asteroid tables: those of the GTOC problems, of the MPC and JPL, and any with a header.
 
-The layout is recognised by the table's header, whatever the file is called:
+A table is read by the names in its header line, whatever the file is called and in
+whatever order the columns stand, parted by commas, semicolons, bars, tabs or blanks:
 
-========  ==================================================================  ==============
-layout    columns                                                             id
-========  ==================================================================  ==============
-GTOC2     spkid, a, e, i, node, argp, M, epoch, group                         spkid
-GTOC4     'name', epoch, a, e, i, node, argp, M                               row, from 1
-GTOC5     epoch, a, e, i, argp, node, M, number and name                      row, from 1
-GTOC7     id, epoch, a, e, i, argp, node, M, name                             id
-GTOC11    id, epoch, a, e, i, node, argp, M, mass                             id
-GTOC12    id, epoch, a, e, i, node, argp, M                                   id
-========  ==================================================================  ==============
+=========  =====================================================================
+column     names (capitals do not matter, but for Omega and omega)
+=========  =====================================================================
+epoch      epoch, epoch_mjd, epoch.mjd, epoch_jd, epoch_mjd2000, t0, jdtdb
+a, e       a, sma, semi-major axis; e, ecc, ec, eccentricity
+i          i, inc, incl, in, inclination
+node       node, om, raan, LAN, Omega, longitude of ascending node
+argp       w, argp, peri, argperi, aop, omega, argument of perihelion
+M          M, ma, mean anomaly
+id         id, spkid, num, number; the row's number, from 1, where there is none
+name       name, full_name, object, designation, pdes; the id where there is none
+=========  =====================================================================
 
-Units in the files are AU, degrees, MJD and kg (mind that GTOC5 and GTOC7 give the
-argument of perihelion before the node). Where a layout has no name, the name is the
-id. Empty lines and lines that begin with ``#`` are skipped. The Earth, which
-GTOC2 lists after its 910 asteroids as group 5, is left out: a table is read
-for its asteroids, and `earth` has the Earth. What a layout has beside ids, names and orbits
-(group, mass) is in the catalogue's `extra` by the column's name. A table of one's own is best
-written in the GTOC12 layout::
+Units stand in parentheses behind a name or after an underscore: ``a(km)``, ``i_rad``,
+``epoch(MJD2000)``. Without any they are AU, degrees and MJD; Julian dates are known by their
+size. A unit that is not known is an error. A table of one's own is best written as::
 
     ID epoch(MJD) a(AU) e i(deg) LAN(deg) argperi(deg) M(deg)
     1 64328 2.3614601 0.0886122 7.14049 103.85129 151.21722 326.5320247
+
+Of the GTOC problems mind that 3, 5 and 7 give the argument of perihelion before the node, 4
+has names in single quotes, and 2 lists the Earth as group 5 after its 910 asteroids, which is left
+out: a table is read for its asteroids, and `earth` has the Earth. What a table has beside ids,
+names and orbits (group, mass) is in the catalogue's `extra` by the column's name. The MPC's
+``MPCORB.DAT`` and elements of JPL Horizons are read too. Empty lines and comments (``#``, ``%``)
+are skipped; files may be gzipped.
 """
 
-import math
-import re
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+import datetime
+import warnings
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from os import PathLike
 from pathlib import Path
-from typing import Final, final
+from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from feasibility.constants import AU, MJD2000_MJD
 from feasibility.errors import InputError
 from feasibility.orbits.catalogue import Catalogue
+from feasibility.orbits.readers.columns import ANGLES, FURTHER, NEEDED, ORBIT
+from feasibility.orbits.readers.header import Header, find_header
+from feasibility.orbits.readers.horizons import horizons_table
+from feasibility.orbits.readers.mpcorb import is_mpcorb, mpcorb_rows
+from feasibility.orbits.readers.rows import Row, read_rows, takes_julian_dates
+from feasibility.orbits.readers.text import read_lines
 
-_ORBIT: Final = ("a", "e", "i", "node", "argp", "M")
-_MAX_MJD: Final = 200_000.0
-_MAX_A_AU: Final = 1e4
-
-
-@final
-@dataclass(frozen=True)
-class _Layout:
-    """How one table is written."""
-
-    name: str
-    header: str
-    """The header's words in lower case, without ``#`` and units in parentheses."""
-    columns: tuple[str, ...]
-    """What each column is; the last may hold several words if it is the name."""
-
-
-_LAYOUTS: Final = (
-    _Layout(
-        "GTOC2",
-        "spkid a e i lan argperi m epoch group",
-        ("id", *_ORBIT, "epoch", "group"),
-    ),
-    _Layout(
-        "GTOC4",
-        "name epoch a e i lan arg. periap. mean anomaly",
-        ("quoted name", "epoch", *_ORBIT),
-    ),
-    _Layout(
-        "GTOC5",
-        "epoch a e i w node m object",
-        ("epoch", "a", "e", "i", "argp", "node", "M", "name"),
-    ),
-    _Layout(
-        "GTOC7",
-        "num epoch a e i w node m name",
-        ("id", "epoch", "a", "e", "i", "argp", "node", "M", "name"),
-    ),
-    _Layout(
-        "GTOC11",
-        "id epoch_mjd a_au e inc_deg raan_deg argp_deg m_deg mass_kg",
-        ("id", "epoch", *_ORBIT, "mass"),
-    ),
-    _Layout(
-        "GTOC12",
-        "id epoch a e i lan argperi m",
-        ("id", "epoch", *_ORBIT),
-    ),
-)
-
-_FURTHER: Final = ("group", "mass")
-"""Columns that are not part of the orbit: `Catalogue.extra`."""
+_NODE_LAST: Final = ("epoch", "a", "e", "i", "argp", "node", "M")
+_KNOWN: Final = {
+    ("id", *ORBIT, "epoch", "group"): "GTOC2",
+    ("name", "epoch", *ORBIT): "GTOC4",
+    (*_NODE_LAST, "name"): "GTOC5",
+    ("id", *_NODE_LAST, "name"): "GTOC7",
+    ("id", "epoch", *ORBIT, "mass"): "GTOC11",
+    ("id", "epoch", *ORBIT): "GTOC12",
+}
+"""Layouts by their columns, for messages."""
 
 _EARTH_GROUP: Final = 5.0
-
-_RANGES: Final[dict[str, tuple[Callable[[float], bool], str]]] = {
-    "a": (lambda x: 0.0 < x <= _MAX_A_AU, "a semi-major axis in AU, more than 0"),
-    "e": (lambda x: 0.0 <= x < 1.0, "an eccentricity of an ellipse, 0 <= e < 1"),
-    "i": (lambda x: 0.0 <= x <= 180.0, "an inclination of 0 to 180 degrees"),
-    "node": (lambda x: abs(x) <= 720.0, "an angle in degrees"),
-    "argp": (lambda x: abs(x) <= 720.0, "an angle in degrees"),
-    "M": (lambda x: abs(x) <= 720.0, "an angle in degrees"),
-    "epoch": (lambda x: 0.0 <= x <= _MAX_MJD, f"an epoch in MJD, 0 to {_MAX_MJD:g}"),
-    "group": (lambda _: True, "a number"),
-    "mass": (lambda _: True, "a number"),
-}
-"""What each numeric column must satisfy, beyond being finite."""
+_MJD_1950: Final = 33_282.0
+_LEAST_ROWS: Final = 3
+"""Rows from which a table is asked about radians."""
 
 
 def read_catalogue(path: str | PathLike[str]) -> Catalogue:
-    """Read an asteroid table of GTOC2, 4, 5, 7, 11 or 12.
+    """Read an asteroid table.
+
+    What is odd, but not surely wrong, is warned about: angles that look like radians, names that
+    are no UTF-8, Julian dates under a header that does not say so, rows that are left out as they
+    lack an element.
 
     Parameters
     ----------
     path : path-like
-        The table, as the organisers published it (any line ends).
+        The table, as its publishers wrote it (any line ends, also gzipped).
 
     Returns
     -------
     Catalogue
         The asteroids in the order of the file; `source` is the path, `extra` has the
-        columns ``group`` (GTOC2) and ``mass`` in kg (GTOC11).
+        columns ``group`` and ``mass`` in kg, where the table has them.
 
     Raises
     ------
@@ -131,147 +96,109 @@ def read_catalogue(path: str | PathLike[str]) -> Catalogue:
         names the file, the line and what was expected.
     """
     file = Path(path)
-    lines = _lines(file)
-    start, layout = _recognise(file, lines)
-    ids: list[int] = []
-    names: list[str] = []
-    orbits: list[list[float]] = []
-    extra: dict[str, list[float]] = {column: [] for column in layout.columns if column in _FURTHER}
-    line_of_id: dict[int, int] = {}
-    for number, row in _rows(file, lines, start, layout):
-        if row.values.get("group") == _EARTH_GROUP:
-            continue
-        identity = len(ids) + 1 if row.identity is None else row.identity
-        if identity in line_of_id:
-            raise InputError(
-                f"{file}, line {number}: id {identity} was given to line "
-                f"{line_of_id[identity]} already; expected different ids"
-            )
-        line_of_id[identity] = number
-        ids.append(identity)
-        names.append(str(identity) if row.name is None else row.name)
-        orbits.append([row.values[column] for column in ("epoch", *_ORBIT)])
-        for column, values in extra.items():
-            values.append(row.values[column])
-    if not ids:
-        raise InputError(
-            f"{file}: the table is empty; expected rows of {layout.name} after the header"
-        )
-    table = np.array(orbits)
+    lines: Sequence[str] = read_lines(file)
+    header = None
+    name = None
+    if is_mpcorb(lines):
+        rows, label = mpcorb_rows(file, lines), "MPCORB"
+    else:
+        _check_other(file, lines)
+        horizons = horizons_table(file, lines)
+        if horizons is not None:
+            lines, name = horizons
+        header = find_header(file, lines, _KNOWN, quoted=_quoted(lines))
+        rows, label = read_rows(file, lines, header), header.label
+    kept = list(_kept(file, rows, name))
+    bodies = [row for _, row in kept]
+    if not bodies:
+        raise InputError(f"{file}: the table is empty; expected rows of {label} after the header")
+    table = np.array([[row.values[column] for column in NEEDED] for row in bodies])
+    if header is not None:
+        _warn(file, lines, header, table)
     elements = np.column_stack([table[:, 1] * AU, table[:, 2], np.radians(table[:, 3:])])
     return Catalogue(
-        ids, names, table[:, 0] - MJD2000_MJD, elements, source=str(file), extra=extra
+        [identity for identity, _ in kept],
+        [row.name or str(identity) for identity, row in kept],
+        table[:, 0] - MJD2000_MJD,
+        elements,
+        source=str(file),
+        extra={
+            column: [row.values[column] for row in bodies]
+            for column in FURTHER
+            if column in bodies[0].values
+        },
     )
 
 
-def _lines(file: Path) -> list[str]:
-    try:
-        data = file.read_bytes()
-    except FileNotFoundError:
-        raise InputError(f"{file}: no such file; expected an asteroid table") from None
-    except IsADirectoryError:
-        raise InputError(f"{file}: is a folder; expected an asteroid table") from None
-    except OSError as error:
-        raise InputError(f"{file}: cannot be read ({error.strerror})") from None
-    try:
-        text = data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        number = len(re.split(rb"\r\n|\r|\n", data[: error.start]))
-        raise InputError(
-            f"{file}, line {number}: byte 0x{data[error.start]:02x} is not UTF-8 text; "
-            "expected an asteroid table as plain text"
-        ) from None
-    if not text.strip():
-        raise InputError(f"{file}: the file is empty; expected an asteroid table")
-    return re.split(r"\r\n|\r|\n", text)
+def _quoted(lines: Sequence[str]) -> tuple[str, ...]:
+    """Return the layouts whose names are quoted: GTOC4, told from other tables by its header."""
+    return ("GTOC4",) if any("arg. periap." in line.lower() for line in lines[:20]) else ()
 
 
-def _recognise(file: Path, lines: list[str]) -> tuple[int, _Layout]:
-    """Return the index of the first line after the header, and the layout."""
-    for index, line in enumerate(lines):
-        comment = line.lstrip().startswith("#")
-        words = " ".join(re.sub(r"\([^)]*\)", " ", line.lower()).replace("#", " ").split())
-        for layout in _LAYOUTS:
-            # The comma or dot that some headers end with is no part of the last word.
-            if words.rstrip(".,;") == layout.header:
-                return index + 1, layout
-        if words and not comment:
-            break
-    known = ", ".join(layout.name for layout in _LAYOUTS)
-    raise InputError(
-        f"{file}, line {index + 1}: unknown layout; expected the header line of an asteroid "
-        f"table ({known})"
-    )
+def _check_other(file: Path, lines: Sequence[str]) -> None:
+    """Name formats that are known, but not read."""
+    begin = next(line.strip() for line in lines if line.strip())
+    if begin.startswith(("{", "[{", "[")) and not begin.startswith("[]"):
+        raise InputError(f"{file}: is JSON; expected a table, such as the MPC's MPCORB.DAT")
+    if begin.startswith("<"):
+        raise InputError(f"{file}: is XML or a web page; expected a table as plain text")
 
 
-@final
-@dataclass(frozen=True)
-class _Row:
-    identity: int | None
-    name: str | None
-    values: dict[str, float]
-
-
-def _rows(file: Path, lines: list[str], start: int, layout: _Layout) -> Iterator[tuple[int, _Row]]:
-    last = len(lines) - 1
-    for index in range(start, len(lines)):
-        line = lines[index].strip()
-        # GTOC7 underlines its header with dashes.
-        if not line or line.startswith("#") or not line.strip("- \t"):
+def _kept(file: Path, rows: Iterator[Row | None], name: str | None) -> Iterator[tuple[int, Row]]:
+    """Yield the asteroids, each with an id of its own; tell how many rows were left out."""
+    line_of_id: dict[int, int] = {}
+    left_out = 0
+    for row in rows:
+        if row is None:
+            left_out += 1
             continue
-        try:
-            row = _parse(line, layout)
-        except _RowError as error:
-            cut = "; the last line has no line end: is the file truncated?"
+        if row.values.get("group") == _EARTH_GROUP:
+            continue
+        identity = len(line_of_id) + 1 if row.identity is None else row.identity
+        if identity in line_of_id:
             raise InputError(
-                f"{file}, line {index + 1}: {error}{cut if index == last else ''}"
-            ) from None
-        yield index + 1, row
-
-
-@final
-class _RowError(Exception):
-    """What is wrong with one row; the caller knows the file and the line."""
-
-
-def _parse(line: str, layout: _Layout) -> _Row:
-    columns = layout.columns
-    name = None
-    if columns[0] == "quoted name":
-        quoted = re.match(r"'([^']+)'(?=\s)", line)
-        if quoted is None:
-            raise _RowError(f"expected a name in single quotes first, as {layout.name} has it")
-        name, line, columns = quoted[1].strip(), line[quoted.end() :], columns[1:]
-    words = line.split(None, len(columns) - 1) if columns[-1] == "name" else line.split()
-    if len(words) != len(columns):
-        raise _RowError(
-            f"{len(words)} columns, expected {len(columns)} of {layout.name}: {', '.join(columns)}"
+                f"{file}, line {row.line}: id {identity} was given to line "
+                f"{line_of_id[identity]} already; expected different ids"
+            )
+        line_of_id[identity] = row.line
+        yield identity, row if name is None else replace(row, name=name)
+    if left_out:
+        warnings.warn(
+            f"{file}: {left_out} of {left_out + len(line_of_id)} rows lack an element of an "
+            "ellipse and are left out",
+            stacklevel=4,
         )
-    identity = None
-    values = {}
-    for column, word in zip(columns, words, strict=True):
-        if column == "name":
-            name = word
-        elif column == "id":
-            identity = _identity(word)
-        else:
-            values[column] = _number(column, word)
-    return _Row(identity, name, values)
 
 
-def _identity(word: str) -> int:
-    if not (word.isascii() and word.isdigit() and len(word) < 19):
-        raise _RowError(f"id is {word!r}; expected a whole number")
-    return int(word)
+def _date(mjd: float) -> str:
+    return datetime.date.fromordinal(int(mjd) + 678_576).isoformat()
 
 
-def _number(column: str, word: str) -> float:
-    within, expectation = _RANGES[column]
-    try:
-        # Python reads 1_000 as a number; no table writes that on purpose.
-        value = math.nan if "_" in word else float(word)
-    except ValueError:
-        value = math.nan
-    if not (math.isfinite(value) and within(value)):
-        raise _RowError(f"{column} is {word!r}; expected {expectation}")
-    return value
+def _warn(file: Path, lines: Sequence[str], header: Header, table: NDArray[np.float64]) -> None:
+    degrees = any(column.unit for column in header.columns if column.meaning in ANGLES)
+    angles = np.abs(table[:, 3:])
+    if (
+        not degrees
+        and len(table) >= _LEAST_ROWS
+        and angles.max() <= 2.0 * np.pi
+        and angles.max() > 0.0
+    ):
+        warnings.warn(
+            f"{file}: all angles are within 0 to 2 pi and are read as degrees; if they are "
+            "radians, write i(rad), node(rad), argp(rad) and M(rad) in the header",
+            stacklevel=3,
+        )
+    silent = any(column.meaning == "epoch" and not column.unit for column in header.columns)
+    if silent and table[:, 0].min() < _MJD_1950:
+        day = table[:, 0].min()
+        warnings.warn(
+            f"{file}: epoch {day:g} is read as MJD, {_date(day)}; if it is another count of days, "
+            "write epoch(MJD2000) or epoch(JD) in the header",
+            stacklevel=3,
+        )
+    if silent and takes_julian_dates(lines, header):
+        warnings.warn(
+            f"{file}: the epochs are read as Julian dates: {table[0, 0] + 2_400_000.5:.10g} is "
+            f"MJD {table[0, 0]:.10g}",
+            stacklevel=3,
+        )

@@ -5,6 +5,8 @@ in unions that a key such as ``kind`` tells apart. With ``forbid_unknown_fields=
 key is an error that lists the known ones.
 """
 
+import codecs
+import math
 import re
 import tomllib
 from collections.abc import Iterator
@@ -17,6 +19,8 @@ from msgspec import inspect
 from feasibility.errors import InputError
 
 _T = TypeVar("_T")
+
+_MAX_INTEGER: Final = 2**63 - 1
 
 _PLACE: Final = re.compile(r"^(?P<text>.*?)(?: - at `\$(?P<place>.*)`)?$", re.DOTALL)
 """Msgspec's messages: ``Expected `float`, got `str` - at `$.spacecraft.thrust_n```."""
@@ -52,7 +56,10 @@ def read_toml_text(path: Path) -> str:
         There is no such file, or it cannot be read or is not text.
     """
     try:
-        return path.read_text(encoding="utf-8")
+        data = path.read_bytes()
+        # Windows' editors and shells begin a file with a byte order mark.
+        utf_16 = data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+        return data.decode("utf-16" if utf_16 else "utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or "not text"
         raise InputError(f"{path}: cannot be read as a TOML file ({reason})") from None
@@ -84,12 +91,35 @@ def parse_toml(text: str, label: str) -> dict[str, Any]:
     Raises
     ------
     InputError
-        The text is not TOML.
+        The text is not TOML, or has a number beyond what 64 bits hold.
     """
     try:
-        return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{label}: not valid TOML ({error})") from None
+        plain = tomllib.loads(text)
+    except (ValueError, RecursionError) as error:
+        reason = "nested too deeply" if isinstance(error, RecursionError) else str(error)
+        raise InputError(f"{label}: not valid TOML ({reason})") from None
+    for place, value in _numbers(plain, ""):
+        if isinstance(value, float) and not math.isfinite(value):
+            raise InputError(f"{label}: {place} is {value}, expected a finite number")
+        if isinstance(value, int) and abs(value) > _MAX_INTEGER:
+            digits = int(value.bit_length() * math.log10(2.0)) + 1
+            raise InputError(
+                f"{label}: {place} is a whole number of about {digits} digits, expected at "
+                f"most {_MAX_INTEGER}"
+            )
+    return plain
+
+
+def _numbers(plain: object, place: str) -> Iterator[tuple[str, object]]:
+    """Yield every number with its table and key."""
+    if isinstance(plain, dict):
+        for key, value in plain.items():
+            yield from _numbers(value, f"{place}.{key}".lstrip("."))
+    elif isinstance(plain, list):
+        for value in plain:
+            yield from _numbers(value, place)
+    elif isinstance(plain, int | float):
+        yield place, plain
 
 
 def convert_table(plain: object, kind: type[_T], label: str, table: str = "") -> _T:
@@ -128,7 +158,7 @@ def _readable(message: str, plain: object, kind: type, table: str) -> str:
         return f"unknown key {text.split('`')[1]!r} {inside}; known keys are {known}"
     if text.startswith("Object missing required field"):
         return f"no key {text.split('`')[1]!r} {inside}, expected one"
-    text = text[0].lower() + text[1:]
+    text = " ".join((text[:1].lower() + text[1:]).split())
     return f"{text} (at {where})" if where else text
 
 

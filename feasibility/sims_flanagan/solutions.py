@@ -15,6 +15,16 @@ THROTTLE_TOLERANCE: Final = 1e-6
 """By how much the norm of a throttle may exceed 1 through rounding in a solver."""
 
 
+LIGHT: Final = 4.0
+"""A leg this many times lighter than m* may burn less on another arc than on that of m*.
+
+Below it two-impulse arcs won on fewer than 1 % of belt legs.
+"""
+
+TWO_IMPULSE: Final = 50
+"""`LegSolutions.start` of the cheapest two-impulse arc; the next ones follow."""
+
+
 @final
 class Status(IntEnum):
     """How the solution of one leg ended."""
@@ -39,7 +49,10 @@ class LegSolutions:
     Attributes
     ----------
     throttles : (n, s, 3) float64
-        Throttle vectors, norm at most 1, heliocentric frame; NaN where not converged.
+        Throttle vectors, norm at most 1, heliocentric frame; NaN where not converged. In
+        the first s // 2 segments an impulse is thrust x dt x throttle / the mass before it, in
+        the others / the mass after it (pykep's convention, cut one half): `impulses` gives
+        them in m/s.
     m0 : (n,) float64, kg
         Initial mass: the maximum initial mass m* or the given one; 0 where not
         converged.

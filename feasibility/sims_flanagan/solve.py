@@ -7,12 +7,17 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from feasibility.constants import G0, MU_SUN
 from feasibility.errors import InputError
 from feasibility.legs import Legs
+from feasibility.sims_flanagan.pykep_leg import N_SEGMENTS
 from feasibility.sims_flanagan.solutions import LegSolutions
 
 DEFAULT_METHOD: Final = "fast"
 """Method of all solves that do not name one."""
+
+BOTH: Final = "best"
+"""Method that asks both solvers and takes, for each leg, the better solution."""
 
 _HOME = "feasibility.sims_flanagan"
 _MAXIMUM_MASS: Final = {
@@ -25,7 +30,13 @@ _MINIMUM_PROPELLANT: Final = {
 }
 
 
-def max_initial_mass(legs: Legs, *, method: str = DEFAULT_METHOD) -> NDArray[np.float64]:
+def max_initial_mass(
+    legs: Legs,
+    *,
+    method: str = DEFAULT_METHOD,
+    n_segments: int = N_SEGMENTS,
+    mu: float = MU_SUN,
+) -> NDArray[np.float64]:
     """Return the maximum initial mass m* of each leg, for which it is just flyable.
 
     Parameters
@@ -33,9 +44,14 @@ def max_initial_mass(legs: Legs, *, method: str = DEFAULT_METHOD) -> NDArray[np.
     legs : Legs
         n legs; their `m0` and `m_dry` play no part.
     method : str
-        Solver: "fast", our own batch solver, or "reference", pykep's leg with
-        pygmo's IPOPT and SLSQP, a hundred times slower. Both are confirmed by
-        pykep's leg.
+        Solver: "fast", our own batch solver, "reference", pykep's leg with
+        pygmo's IPOPT and SLSQP, a hundred times slower, or "best", the better
+        solution of both. All are confirmed by pykep's leg.
+    n_segments : int
+        Segments of each leg, s, two or more. More come nearer to continuous thrust:
+        20 shift m* by up to half a per cent.
+    mu : float, m3/s2
+        Gravitational parameter, for problems with a Sun of their own.
 
     Returns
     -------
@@ -46,15 +62,20 @@ def max_initial_mass(legs: Legs, *, method: str = DEFAULT_METHOD) -> NDArray[np.
     Raises
     ------
     InputError
-        `method` is unknown.
+        `method` is unknown, `n_segments` below two, or `mu` not positive.
     MissingDependencyError
         pykep or pygmo is not installed.
     """
-    return solve_max_initial_mass(legs, method=method).m0
+    return solve_max_initial_mass(legs, method=method, n_segments=n_segments, mu=mu).m0
 
 
 def solve_max_initial_mass(
-    legs: Legs, *, method: str = DEFAULT_METHOD, guess: LegSolutions | None = None
+    legs: Legs,
+    *,
+    method: str = DEFAULT_METHOD,
+    guess: LegSolutions | None = None,
+    n_segments: int | None = None,
+    mu: float = MU_SUN,
 ) -> LegSolutions:
     """Find the maximum initial mass of each leg, with throttles and masses.
 
@@ -67,6 +88,10 @@ def solve_max_initial_mass(
     guess : LegSolutions, optional
         Solutions of the same legs, from which the reference starts too; the fast
         solver takes none.
+    n_segments : int, optional
+        Segments of each leg; those of `guess` if that is given, otherwise 20.
+    mu : float, m3/s2
+        Gravitational parameter.
 
     Returns
     -------
@@ -76,20 +101,34 @@ def solve_max_initial_mass(
     Raises
     ------
     InputError
-        `method` is unknown, or `guess` does not fit the legs or the method.
+        `method` is unknown, a number is out of range, or `guess` does not fit the
+        legs, the segments or the method.
     MissingDependencyError
         pykep or pygmo is not installed.
     """
+    segments = _segments(n_segments, guess)
+    legs = _as_about_the_sun(legs, mu)
+    if method == BOTH:
+        fast: LegSolutions = _solver(_MAXIMUM_MASS, "fast")(legs, n_segments=segments)
+        start = fast if guess is None else _better(fast, guess, fast.m0, guess.m0)
+        # The reference keeps what it is given unless it finds a larger mass.
+        best: LegSolutions = _solver(_MAXIMUM_MASS, "reference")(legs, guess=start)
+        return best
     solver = _solver(_MAXIMUM_MASS, method)
     if guess is not None and method != "reference":
         raise InputError(f"guess: method {method!r} takes none, expected method 'reference'")
-    options = {} if guess is None else {"guess": guess}
+    options = {"n_segments": segments} if guess is None else {"guess": guess}
     solutions: LegSolutions = solver(legs, **options)
     return solutions
 
 
 def optimise(
-    legs: Legs, *, method: str = DEFAULT_METHOD, guess: LegSolutions | None = None
+    legs: Legs,
+    *,
+    method: str = DEFAULT_METHOD,
+    guess: LegSolutions | None = None,
+    n_segments: int | None = None,
+    mu: float = MU_SUN,
 ) -> LegSolutions:
     """Find the minimum-propellant solution of each leg at its own initial mass.
 
@@ -101,6 +140,10 @@ def optimise(
         Solver, as for `max_initial_mass`.
     guess : LegSolutions, optional
         What `solve_max_initial_mass` returned for the same legs; found here if not given.
+    n_segments : int, optional
+        Segments of each leg; those of `guess` if that is given, otherwise 20.
+    mu : float, m3/s2
+        Gravitational parameter.
 
     Returns
     -------
@@ -111,17 +154,77 @@ def optimise(
     Raises
     ------
     InputError
-        `method` is unknown, or `guess` does not fit the legs.
+        `method` is unknown, a number is out of range, or `guess` does not fit the legs
+        or the segments.
     MissingDependencyError
         pykep or pygmo is not installed.
     """
-    solutions: LegSolutions = _solver(_MINIMUM_PROPELLANT, method)(legs, guess=guess)
+    segments = _segments(n_segments, guess)
+    legs = _as_about_the_sun(legs, mu)
+    if method == BOTH:
+        if guess is None:
+            guess = solve_max_initial_mass(legs, method=BOTH, n_segments=segments)
+        fast: LegSolutions = _solver(_MINIMUM_PROPELLANT, "fast")(legs, guess=guess)
+        slow: LegSolutions = _solver(_MINIMUM_PROPELLANT, "reference")(legs, guess=guess)
+        return _better(fast, slow, fast.m_final, slow.m_final)
+    solver = _solver(_MINIMUM_PROPELLANT, method)
+    solutions: LegSolutions = solver(legs, guess=guess, n_segments=segments)
     return solutions
+
+
+def _segments(n_segments: int | None, guess: LegSolutions | None) -> int:
+    if n_segments is not None and n_segments < 2:
+        raise InputError(f"n_segments: {n_segments}, expected 2 or more")
+    if guess is None:
+        return N_SEGMENTS if n_segments is None else n_segments
+    if n_segments is not None and n_segments != guess.n_segments:
+        raise InputError(f"n_segments: {n_segments}, expected {guess.n_segments} as in the guess")
+    return guess.n_segments
+
+
+def _as_about_the_sun(legs: Legs, mu: float) -> Legs:
+    """Return legs about the Sun that have the same throttles and masses as these about `mu`.
+
+    With lengths as they are and times longer by the factor k = sqrt(mu / mu_Sun), velocities
+    shrink by k and accelerations by k^2, as gravity does.
+    """
+    if mu == MU_SUN:
+        return legs
+    if not (np.isfinite(mu) and mu > 0.0):
+        raise InputError(f"mu: {mu}, expected a positive number of m3/s2")
+    k = float(np.sqrt(mu / MU_SUN))
+    rv_dep, rv_arr = legs.rv_dep.copy(), legs.rv_arr.copy()
+    rv_dep[:, 3:] /= k
+    rv_arr[:, 3:] /= k
+    return Legs(
+        rv_dep=rv_dep,
+        rv_arr=rv_arr,
+        tof_days=legs.tof_days * k,
+        m0=legs.m0,
+        thrust=legs.thrust / k**2,
+        isp=legs.exhaust_velocity / (k * G0),
+        m_dry=legs.m_dry,
+    )
+
+
+def _better(
+    one: LegSolutions,
+    other: LegSolutions,
+    one_value: NDArray[np.float64],
+    other_value: NDArray[np.float64],
+) -> LegSolutions:
+    """Return, row by row, the converged solution of larger value; `one` where neither has."""
+    if len(one) != len(other):
+        raise InputError(f"guess: {len(other)} rows, expected {len(one)} as there are legs")
+    n = len(one)
+    take_other = other.converged & (~one.converged | (other_value > one_value))
+    both = LegSolutions.concatenate([one, other])
+    return both.take(np.where(take_other, n + np.arange(n), np.arange(n)))
 
 
 def _solver(table: dict[str, str], method: str) -> Callable[..., Any]:
     if method not in table:
-        known = ", ".join(repr(name) for name in table)
+        known = ", ".join(repr(name) for name in (*table, BOTH))
         raise InputError(f"method: {method!r} is unknown, expected one of {known}")
     # Imported on use: a solver may need pygmo or compiled kernels, the others do not.
     module, _, name = table[method].partition(":")

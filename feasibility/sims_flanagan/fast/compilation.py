@@ -45,7 +45,9 @@ def compile_kernels() -> None:
             _compile_first_half()
             if other:
                 _wait(other[0])
-        fast_min_propellant(legs, guess=fast_max_initial_mass(legs))
+        heaviest = fast_max_initial_mass(legs)
+        # A light leg, which passes through all kernels.
+        fast_min_propellant(legs.with_m0(0.1 * heaviest.m0), guess=heaviest)
 
 
 def compile_second_half() -> None:
@@ -54,6 +56,7 @@ def compile_second_half() -> None:
     from feasibility.sims_flanagan.fast.arc_kernels import close
     from feasibility.sims_flanagan.fast.newton_kernels import polish
     from feasibility.sims_flanagan.fast.propellant_kernels import minimum_batch
+    from feasibility.sims_flanagan.fast.restart_kernels import minimum_restarts
 
     w, six, impulses, batch = _examples()
     with rare_collections():
@@ -61,7 +64,9 @@ def compile_second_half() -> None:
         _compile(polish, six, impulses, 2, 1, 1.0, 1.0, six, w)
         rows, numbers = batch
         throttles = np.zeros((1, 2, 3))
-        _compile(minimum_batch, rows, rows, numbers, numbers, numbers, 2, 1.0, throttles, numbers)
+        leg = (rows, rows, numbers, numbers, numbers, 2, 1.0, throttles, numbers)
+        _compile(minimum_batch, *leg)
+        _compile(minimum_restarts, *leg, np.zeros(1, dtype=np.int64))
 
 
 def _compile_first_half() -> None:

@@ -48,7 +48,10 @@ from feasibility.sims_flanagan.fast.workspace_kernels import (
 
 _OUTER = 60
 _NEWTON = 30
+_SOFTEST = 0.3
 _SHARPEST = 0.003
+# Share of the needed thrust that softened switching may give to segments that should coast.
+_LEAK = 0.3
 _FLOOR = 1e-3
 _REJECTIONS = 4
 _ATTEMPTS = 4
@@ -310,6 +313,22 @@ def set_thresholds(
 
 
 @inner_kernel
+def softest_switching(total: float, n: int, cap: _Array) -> float:
+    """Return the width of the softened switching to begin with.
+
+    A coasting segment, whose primer is zero, still gets exp(-1 / width) of full thrust. On legs
+    that need a few hundredths of full thrust this must be less than what they need.
+    """
+    full = 0.0
+    for i in range(n):
+        full += cap[i]
+    leak = _LEAK * total / full
+    if leak > math.exp(-1.0 / _SOFTEST):
+        return _SOFTEST
+    return max(-1.0 / math.log(max(leak, 1e-300)), _SHARPEST)
+
+
+@inner_kernel
 def minimise_one(
     x0: _Array, target: _Array, tof: float, c: float, z: float, n: int, dv: _Array, w: Workspace
 ) -> float:
@@ -328,7 +347,8 @@ def minimise_one(
     for i in range(6):
         lam[i] = 0.0
     best = clip_to_thrust(dv, n, n_forward, c, z, cap)
-    sharpness = 0.3
+    softest = softest_switching(best, n, cap)
+    sharpness = softest
     fraction = 1.0
     rejected = 0
     for _ in range(_OUTER):
@@ -354,7 +374,7 @@ def minimise_one(
                 threshold[i] = 1.0
             for i in range(6):
                 lam[i] = 0.0
-            sharpness = 0.3
+            sharpness = softest
             continue
         set_thresholds(linear, n, n_forward, c, norm, threshold)
         predicted = 0.0
@@ -392,7 +412,7 @@ def minimise_one(
             if rejected >= _REJECTIONS:
                 break
             fraction = 1.0
-            sharpness = min(10.0 * sharpness, 0.3)
+            sharpness = min(10.0 * sharpness, softest)
     return best
 
 

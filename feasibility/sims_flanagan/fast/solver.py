@@ -17,8 +17,10 @@ from feasibility.errors import InputError
 from feasibility.legs import Legs
 from feasibility.sims_flanagan.pykep_leg import N_SEGMENTS, confirm
 from feasibility.sims_flanagan.solutions import (
+    LIGHT,
     MISMATCH_TOLERANCE,
     THROTTLE_TOLERANCE,
+    TWO_IMPULSE,
     LegSolutions,
     Status,
 )
@@ -100,7 +102,9 @@ def fast_min_propellant(
     """Return the solution of largest final mass of each leg at its own initial mass.
 
     As only thrust over mass enters the motion, the maximum-initial-mass solution with
-    its throttles times m0 / m* closes the leg at m0: it is the start.
+    its throttles times m0 / m* closes the leg at m0: it is the start. Legs of less than a
+    quarter of m* are also started from the cheapest two-impulse arcs, which wait, coast or
+    turn otherwise than the arc of m*; the best solution counts.
 
     Parameters
     ----------
@@ -115,9 +119,9 @@ def fast_min_propellant(
     Returns
     -------
     LegSolutions
-        n rows; `start` is that of the guess. Rows heavier than the guess are
-        `Status.TOO_HEAVY`, rows that need more propellant than there is
-        `Status.BELOW_DRY_MASS`.
+        n rows; `start` is that of the guess, or `TWO_IMPULSE` and above where a two-impulse
+        arc won. Rows heavier than the guess are `Status.TOO_HEAVY`, rows that need more
+        propellant than there is `Status.BELOW_DRY_MASS`.
 
     Raises
     ------
@@ -153,8 +157,9 @@ def fast_min_propellant(
         throttles,
         ratio,
     )
-    seconds = np.full(len(rows), (time.thread_time() - began) / len(rows))
     start = guess.start[rows].astype(np.int64)
+    _restart_light(flyable, guess.m0[rows], z, throttles, ratio, start)
+    seconds = np.full(len(rows), (time.thread_time() - began) / len(rows))
     m_final = flyable.m0 * ratio
     found = _confirmed(flyable, throttles, flyable.m0, m_final, start, seconds)
     merged = {name: getattr(solutions, name) for name in LegSolutions.__dataclass_fields__}
@@ -164,6 +169,41 @@ def fast_min_propellant(
         column[rows[enough]] = getattr(found, name)[enough]
     solutions.seconds[rows] = seconds
     return solutions
+
+
+def _restart_light(
+    legs: Legs,
+    heaviest: NDArray[np.float64],
+    z: NDArray[np.float64],
+    throttles: NDArray[np.float64],
+    ratio: NDArray[np.float64],
+    start: NDArray[np.int64],
+) -> None:
+    """Overwrite throttles, mass ratio and start of the light legs that other arcs serve better."""
+    from feasibility.sims_flanagan.fast.restart_kernels import minimum_restarts
+
+    light = np.flatnonzero(legs.m0 * LIGHT < heaviest)
+    if not len(light):
+        return
+    some = legs.take(light)
+    better, larger = throttles[light], ratio[light]
+    winner = np.full(len(light), -1, dtype=np.int64)
+    minimum_restarts(
+        some.rv_dep.copy(),
+        some.rv_arr.copy(),
+        some.tof_s,
+        some.exhaust_velocity,
+        z[light],
+        throttles.shape[1],
+        MU_SUN,
+        better,
+        larger,
+        winner,
+    )
+    won = winner >= 0
+    rows = light[won]
+    throttles[rows], ratio[rows] = better[won], larger[won]
+    start[rows] = TWO_IMPULSE + winner[won]
 
 
 def _bent_paths() -> NDArray[np.float64]:

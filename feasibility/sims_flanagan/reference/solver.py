@@ -25,10 +25,13 @@ from feasibility.sims_flanagan.reference.starts import (
     N_HOPS,
     bends,
     reference_starts,
+    two_impulse_starts,
 )
 from feasibility.sims_flanagan.solutions import (
+    LIGHT,
     MISMATCH_TOLERANCE,
     THROTTLE_TOLERANCE,
+    TWO_IMPULSE,
     LegSolutions,
     Status,
 )
@@ -200,7 +203,8 @@ def reference_min_propellant(
     The start is the maximum-initial-mass solution: as only thrust / mass
     enters the motion, its throttles times m0 / m* close the leg at m0 exactly.
     Each row is then improved by SLSQP, and by IPOPT where that fails; the
-    start itself remains where both do.
+    start itself remains where both do. A leg of less than a quarter of m* is
+    solved from the cheapest two-impulse arcs as well.
 
     Parameters
     ----------
@@ -215,7 +219,8 @@ def reference_min_propellant(
     Returns
     -------
     LegSolutions
-        n rows; `start` is that of the guess. A leg whose initial mass exceeds
+        n rows; `start` is that of the guess, or `TWO_IMPULSE` and above where a
+        two-impulse arc won. A leg whose initial mass exceeds
         that of the guess is `Status.TOO_HEAVY` without a solve; one that needs
         more propellant than there is is `Status.BELOW_DRY_MASS`.
 
@@ -237,31 +242,51 @@ def reference_min_propellant(
         if legs.m0[row] > guess.m0[row] * (1.0 + _MASS_ROUNDING):
             solutions.status[row] = Status.TOO_HEAVY
         else:
-            found = _minimise_propellant(legs, int(row), guess)
+            found, start = _minimise_propellant(legs, int(row), guess)
             if found is not None and found.m_final < legs.m_dry[row]:
                 solutions.status[row] = Status.BELOW_DRY_MASS
             elif found is not None:
-                _put(solutions, int(row), found, int(guess.start[row]))
+                _put(solutions, int(row), found, start)
         solutions.seconds[row] = time.process_time() - began
     return solutions
 
 
-def _minimise_propellant(legs: Legs, row: int, guess: LegSolutions) -> _Closed | None:
+def _minimise_propellant(legs: Legs, row: int, guess: LegSolutions) -> tuple[_Closed | None, int]:
+    """Return the best of all starts, and the number of its start."""
     m0 = float(legs.m0[row])
     lighter = m0 / float(guess.m0[row])
     throttles = guess.throttles[row].ravel() * lighter
     m_final = float(guess.m_final[row]) * lighter
     best = _confirmed(legs, row, throttles, m0, m_final)
-    x0 = np.concatenate([throttles, [m_final / m0]])
+    best_start = int(guess.start[row])
     for algorithm in (_slsqp(), _ipopt()):
-        # The dry mass is compared with the optimum and is no bound of the problem:
-        # as a bound it would make "needs too much propellant" look like "did not converge".
-        leg = scaled_leg(legs, row, m0, guess.n_segments)
-        x = _evolve(MinimumPropellantProblem(leg), x0, algorithm)
-        found = _confirmed(legs, row, x[:-1], m0, float(x[-1]) * m0)
+        found = _solve_minimum(legs, row, throttles, m_final / m0, algorithm)
         if found is not None and (best is None or found.m_final > best.m_final):
-            return found
-    return best
+            best = found
+            break
+    if lighter * LIGHT < 1.0:
+        for number, impulses in enumerate(two_impulse_starts(legs, row, guess.n_segments)):
+            masses, final = _mass_profile(impulses, float(legs.exhaust_velocity[row]))
+            push = legs.thrust[row] * legs.tof_s[row] / guess.n_segments / m0
+            throttles = impulses * (masses / push)[:, None]
+            throttles /= np.maximum(1.0, np.linalg.norm(throttles, axis=1, keepdims=True))
+            found = _solve_minimum(legs, row, throttles.ravel(), final, _slsqp())
+            if found is not None and (best is None or found.m_final > best.m_final):
+                best, best_start = found, TWO_IMPULSE + number
+    return best, best_start
+
+
+def _solve_minimum(
+    legs: Legs, row: int, throttles: NDArray[np.float64], final: float, algorithm: Any
+) -> _Closed | None:
+    """Return what an algorithm makes of throttles (3 s,) and a final mass in initial masses."""
+    # The dry mass is compared with the optimum and is no bound of the problem:
+    # as a bound it would make "needs too much propellant" look like "did not converge".
+    m0 = float(legs.m0[row])
+    leg = scaled_leg(legs, row, m0, len(throttles) // 3)
+    guess = np.concatenate([throttles, [final]])
+    x = _evolve(MinimumPropellantProblem(leg), guess, algorithm)
+    return _confirmed(legs, row, x[:-1], m0, float(x[-1]) * m0)
 
 
 def _agreed(masses: list[float], agreement: int) -> bool:

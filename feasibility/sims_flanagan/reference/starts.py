@@ -15,6 +15,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from feasibility.constants import MU_SUN
+from feasibility.legs import Legs
 from feasibility.runtime.pykep_guard import load_pykep
 
 Start = tuple[int, NDArray[np.float64]]
@@ -49,6 +51,7 @@ FIRST_RANDOM: Final = FROM_GUESS + 1
 """Index of the first random start."""
 
 _KNOTS = 4
+_TWO_IMPULSE_STARTS = 3
 
 
 def reference_starts(leg: Any, n_random: int, rng: np.random.Generator | None) -> Iterator[Start]:
@@ -84,10 +87,18 @@ def reference_starts(leg: Any, n_random: int, rng: np.random.Generator | None) -
 
 
 def _lambert(leg: Any) -> Iterator[Start]:
-    """Yield the two impulses of every Lambert branch, each spread over its half of the leg."""
+    """Yield the two impulses of every Lambert branch, each spread over its half of the leg.
+
+    The arcs turn as the departure orbit does, be it prograde or retrograde.
+    """
     (r_dep, v_dep), (r_arr, v_arr) = leg.rvs, leg.rvf
+    normal = np.cross(r_dep, r_arr)
+    if normal[2] == 0.0:
+        # pykep cannot tell one sense of rotation from the other there; other starts remain.
+        return
+    backward = bool(normal @ np.cross(r_dep, v_dep) * normal[2] < 0.0)
     arcs = load_pykep().lambert_problem(
-        r0=r_dep, r1=r_arr, tof=leg.tof, mu=leg.mu, cw=False, multi_revs=MAX_REVOLUTIONS
+        r0=r_dep, r1=r_arr, tof=leg.tof, mu=leg.mu, cw=backward, multi_revs=MAX_REVOLUTIONS
     )
     half = leg.nseg_fwd
     for branch, (v0, v1) in enumerate(zip(arcs.v0, arcs.v1, strict=True)):
@@ -97,6 +108,20 @@ def _lambert(leg: Any) -> Iterator[Start]:
         # The transfer plane is not defined at 180 degrees.
         if np.isfinite(impulses).all():
             yield branch, impulses
+
+
+def two_impulse_starts(legs: Legs, row: int, n_segments: int) -> NDArray[np.float64]:
+    """Return (k, s, 3) m/s, impulses of the cheapest two-impulse arcs of a leg, cheapest first."""
+    from feasibility.sims_flanagan.fast.restart_kernels import two_impulse_batch
+
+    one = legs.take([row])
+    impulses = np.empty((1, _TWO_IMPULSE_STARTS, n_segments, 3))
+    push = one.thrust * one.tof_s / n_segments / one.m0
+    counts = two_impulse_batch(
+        one.rv_dep.copy(), one.rv_arr.copy(), one.tof_s, push, MU_SUN, impulses
+    )
+    found: NDArray[np.float64] = impulses[0, : int(counts[0])]
+    return found
 
 
 def _tangential(leg: Any) -> Iterator[Start]:

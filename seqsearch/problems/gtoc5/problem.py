@@ -9,14 +9,13 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility import InputError, Spacecraft, optimise
+from feasibility import InputError, optimise
 from feasibility.classifier.predictor import LegPredictor
 from feasibility.orbits import Catalogue
 from feasibility.runtime.workers import in_threads
 from feasibility.sims_flanagan import solve_max_initial_mass
 from seqsearch.core.custom_moves import CustomCandidates, CustomMoves
 from seqsearch.core.hops import Hops
-from seqsearch.core.mission import days_until_end, not_visited
 from seqsearch.core.nodes import Nodes
 from seqsearch.core.recording import tour_body
 from seqsearch.core.tree import FlownLeg
@@ -29,7 +28,7 @@ from seqsearch.problems.gtoc5.transfer_plans import TransferPlans
 from seqsearch.problems.moves.directions import even_directions
 from seqsearch.problems.moves.earth_first import earth_first
 from seqsearch.problems.moves.lambert_departure import lambert_departure
-from seqsearch.problems.rendezvous import RendezvousProblem
+from seqsearch.problems.variant import RendezvousVariant
 from seqsearch.settings import SearchSettings
 from seqsearch.tours.tour import TourRules
 
@@ -43,7 +42,7 @@ _CLOSING_DIRECTIONS: Final = 12
 
 @final
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Gtoc5Problem:
+class Gtoc5Problem(RendezvousVariant):
     """Launch from the Earth, then asteroids, each met at rest and in a fly-by.
 
     A node is at rest at an asteroid, after the package was left there. The hop
@@ -66,7 +65,6 @@ class Gtoc5Problem:
         is below what a single visit needs.
     """
 
-    base: RendezvousProblem
     rules: Gtoc5Rules
 
     def __post_init__(self) -> None:
@@ -76,31 +74,6 @@ class Gtoc5Problem:
                 f"problem {self.name}: wet mass {self.m0:g} kg, expected more than the "
                 f"{least:g} kg of a single visit"
             )
-
-    @property
-    def name(self) -> str:
-        """Name, for reports."""
-        return self.base.name
-
-    @property
-    def spacecraft(self) -> Spacecraft:
-        """Dry mass, thrust and specific impulse."""
-        return self.base.spacecraft
-
-    @property
-    def m0(self) -> float:
-        """Mass in kg at the launch."""
-        return self.base.m0
-
-    @property
-    def first_departure_mjd2000(self) -> tuple[float, float]:
-        """Earliest and latest epoch of the launch."""
-        return self.base.first_departure_mjd2000
-
-    @property
-    def max_duration_days(self) -> float:
-        """Longest time from the launch to the last fly-by."""
-        return self.base.max_duration_days
 
     @property
     def min_stay_days(self) -> float:
@@ -134,10 +107,6 @@ class Gtoc5Problem:
     def start_rows(self) -> NDArray[np.intp]:
         """Return the catalogue row of the Earth."""
         return np.zeros(1, dtype=np.intp)
-
-    def start_nodes(self, rows: NDArray[np.intp], t_mjd2000: _Array, /) -> Nodes:
-        """Return the (k,) nodes at bodies and epochs, with full tanks."""
-        return Nodes.at_start(rows, t_mjd2000, np.full(len(rows), self.m0))
 
     def starts(self, settings: SearchSettings, rng: np.random.Generator, /) -> Nodes:
         """Return launches, one from each of ``settings.start_epochs`` equal slices of the window.
@@ -188,16 +157,6 @@ class Gtoc5Problem:
             hops.take(within),
             m_final[within],
             forecast.questions + len(hops),
-        )
-
-    def may_visit(self, nodes: Nodes, target: NDArray[np.intp], /) -> NDArray[np.bool_]:
-        """Return (n, t) whether targets, catalogue rows (n, t), were not visited before."""
-        return not_visited(nodes, target)
-
-    def days_left(self, nodes: Nodes, t_dep_mjd2000: _Array, /) -> _Array:
-        """Return (n, d) days until the longest duration is over; -inf outside the window."""
-        return days_until_end(
-            nodes, t_dep_mjd2000, self.first_departure_mjd2000[1], self.max_duration_days
         )
 
     def hops(
@@ -268,10 +227,6 @@ class Gtoc5Problem:
                 mismatch=float(solved.mismatch[best]),
             ),
         )
-
-    def tour_cost(self, nodes: Nodes, settings: SearchSettings, /) -> _Array:
-        """Return (n,) the weighted shares of time and propellant that are used up."""
-        return self.base.tour_cost(nodes, settings)
 
     def tour_rules(self) -> TourRules:
         """Return the numbers of the problem, with launch, fly-bys, drops and points."""

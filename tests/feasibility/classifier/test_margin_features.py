@@ -107,7 +107,7 @@ def test_other_units_of_length_and_time_change_nothing(seed, length, time, quick
 
 def test_masses_and_thrust_are_not_among_the_inputs():
     legs = drawn("table1", 20)
-    other = Legs(legs.rv_dep, legs.rv_arr, legs.tof_days, 77.0, 5.0, legs.isp, 3.0)
+    other = Legs(legs.rv_dep, legs.rv_arr, legs.tof_days, 77.0, 0.5, legs.isp, 3.0)
     for function in (margin_features, quick_features):
         np.testing.assert_array_equal(function(legs)[0], function(other)[0])
 

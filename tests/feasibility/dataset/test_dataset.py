@@ -147,6 +147,77 @@ def test_a_shard_with_other_columns_is_named(tmp_path):
         read_dataset(tmp_path)
 
 
+def rewrite(path: Path, change, *, keep_checksum: bool = True) -> None:
+    """Write a shard again with some numbers changed, as any program may."""
+    from pyarrow import parquet
+
+    table = parquet.read_table(path)
+    values = table.column("m_star_kg").to_numpy().copy()
+    change(values)
+    index = table.column_names.index("m_star_kg")
+    table = table.set_column(index, "m_star_kg", [values])
+    parquet.write_table(table if keep_checksum else table.replace_schema_metadata(None), path)
+
+
+def nudge(values: np.ndarray) -> None:
+    values[3] = np.nextafter(values[3], np.inf)
+
+
+def test_a_number_that_was_changed_is_found(tmp_path):
+    write(tmp_path, [10, 10])
+    rewrite(shard_path(tmp_path, 1), nudge)
+    with pytest.raises(InputError, match=r"part-00001\.parquet: does not match its checksum"):
+        read_dataset(tmp_path)
+
+
+def test_parts_that_were_swapped_are_found(tmp_path):
+    write(tmp_path, [10, 10])
+    shard_path(tmp_path, 1).write_bytes(shard_path(tmp_path, 0).read_bytes())
+    with pytest.raises(InputError, match=r"part-00001\.parquet: does not match its checksum"):
+        read_dataset(tmp_path)
+
+
+def test_a_part_without_checksum_is_refused_where_the_others_have_some(tmp_path):
+    write(tmp_path, [10])
+    rewrite(shard_path(tmp_path, 0), nudge, keep_checksum=False)
+    # As in datasets of older versions.
+    assert len(read_dataset(tmp_path)) == 10
+    write_metadata(tmp_path, metadata(10, 10) | {"checksums": "sha256"})
+    with pytest.raises(InputError, match=r"part-00000\.parquet: has no checksum"):
+        read_dataset(tmp_path)
+
+
+def test_a_dataset_in_a_folder_named_like_a_partition_is_read(tmp_path):
+    folder = tmp_path / "seed=1"
+    folder.mkdir()
+    write(folder, [10])
+    assert len(read_dataset(folder)) == 10
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"seed": 7}, "does not match its checksum"),
+        ({"sha256": "abc"}, "does not match its checksum"),
+        ({"sha256": None, "legs": "ten"}, "legs is 'ten', expected a whole number"),
+        ({"sha256": None, "legs": True}, "legs is True"),
+        ({"sha256": None, "legs": 0}, "0 legs in parts of 10"),
+        ({"sha256": None, "legs": 10**15}, "legs in parts of 10, expected at most"),
+        ({"sha256": None, "protocol": []}, "no table 'protocol'"),
+        ({"sha256": None, "catalogue": {}}, "catalogue.bodies is None"),
+    ],
+)
+def test_metadata_that_were_changed_or_lack_something_are_one_line(tmp_path, change, message):
+    write(tmp_path, [10])
+    path = tmp_path / METADATA
+    record = json.loads(path.read_text()) | change
+    path.write_text(json.dumps({k: v for k, v in record.items() if v is not None}))
+    with pytest.raises(InputError, match=message) as caught:
+        read_dataset(tmp_path)
+    assert str(caught.value).startswith(str(path))
+    assert "\n" not in str(caught.value)
+
+
 def test_another_format_version_is_refused(tmp_path):
     write(tmp_path, [10])
     path = tmp_path / METADATA

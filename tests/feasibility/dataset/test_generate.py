@@ -20,6 +20,7 @@ from feasibility.dataset import Dataset, begin, read_dataset, read_protocol
 from feasibility.dataset.inspection import inspect_dataset
 from feasibility.dataset.labels import make_shard
 from feasibility.dataset.storage import METADATA, shard_path
+from feasibility.runtime.locks import LOCK, folder_lock
 from feasibility.runtime.workers import worker_pool
 from feasibility.sims_flanagan import Status
 
@@ -177,7 +178,7 @@ def test_kill_9_and_resume_gives_the_dataset_of_an_undisturbed_run(
     assert_same_rows(undisturbed, read_dataset(folder))
     for name, written in finished.items():
         assert (folder / name).stat().st_mtime_ns == written
-    assert not list(folder.glob(".*"))
+    assert [path.name for path in folder.glob(".*")] == [LOCK]
 
 
 def test_a_damaged_shard_is_made_again(protocol_file, undisturbed, tmp_path):
@@ -187,6 +188,37 @@ def test_a_damaged_shard_is_made_again(protocol_file, undisturbed, tmp_path):
     path.write_bytes(path.read_bytes()[:-20])
     assert generate(protocol_file, folder) == 0
     assert_same_rows(undisturbed, read_dataset(folder))
+
+
+def test_a_second_process_gets_one_line(protocol_file, tmp_path, capsys):
+    folder = tmp_path / "data"
+    generation = begin(read_protocol(str(protocol_file)), 50, folder)
+    with folder_lock(folder):
+        assert generate(protocol_file, folder, legs=50) == 2
+        assert "data: in use by another process" in capsys.readouterr().err
+        with pytest.raises(InputError, match="in use by another process"):
+            generation.run()
+    generation.run()
+    assert len(read_dataset(folder)) == 50
+
+
+def test_a_dataset_of_an_older_version_without_checksums_is_completed(protocol_file, tmp_path):
+    from pyarrow import parquet
+
+    folder = tmp_path / "data"
+    assert generate(protocol_file, folder, legs=40) == 0
+    path = folder / METADATA
+    old = {
+        key: value
+        for key, value in json.loads(path.read_text()).items()
+        if key not in ("checksums", "sha256")
+    }
+    path.write_text(json.dumps(old))
+    part = shard_path(folder, 0)
+    parquet.write_table(parquet.read_table(part).replace_schema_metadata(None), part)
+    assert len(read_dataset(folder)) == 40
+    assert generate(protocol_file, folder, legs=50) == 0
+    assert len(read_dataset(folder)) == 50
 
 
 def test_ctrl_c_stops_cleanly_and_says_how_to_go_on(protocol_file, tmp_path):
@@ -226,7 +258,7 @@ def test_a_full_disk_is_one_line_and_leaves_the_earlier_shards(
         r"feasibility: .*part-00002\.parquet: cannot be written \(No space left.*\)\n", error
     )
     assert shards(folder) == ["part-00000.parquet", "part-00001.parquet"]
-    assert not list(folder.glob(".*"))
+    assert [path.name for path in folder.glob(".*")] == [LOCK]
     assert generate(protocol_file, folder) == 0
     assert_same_rows(undisturbed, read_dataset(folder))
 

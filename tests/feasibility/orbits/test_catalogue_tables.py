@@ -151,9 +151,9 @@ FAULTS = {
     "only comments": ("# nothing\n# here\n", "unknown layout"),
     "empty": ("", "the file is empty"),
     "only white space": ("\r\n \r\n", "the file is empty"),
-    "undecodable bytes": (
-        GTOC7.encode().replace(b"1999 TK", b"1999 \xe9\xff"),
-        "line 4: byte 0xe9 is not UTF-8 text",
+    "bytes that are no text": (
+        GTOC7.encode().replace(b"1999 TK", b"1999 \xe9\x00"),
+        "line 4: byte 0x00 is no text",
     ),
 }
 

@@ -132,3 +132,33 @@ def test_a_file_that_cannot_be_read_is_named(tmp_path):
     (tmp_path / "binary.toml").write_bytes(b"\xff\xfe\xfa")
     with pytest.raises(InputError, match=r"binary\.toml: cannot be read .*\(not text\)"):
         read_toml(tmp_path / "binary.toml", File)
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16"])
+def test_a_byte_order_mark_does_not_matter(tmp_path, encoding):
+    path = tmp_path / "marked.toml"
+    path.write_bytes("beam = 3\n".encode(encoding))
+    assert read_toml(path, Search).beam == 3
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (f"beam = {2**63}", "mine: beam is a whole number of about 20 digits"),
+        (f"beam = -{10**400}", "mine: beam is a whole number of about 40[01] digits"),
+        ("beam = 1" + 5000 * "0", "mine: not valid TOML"),
+        (
+            f"[scouts]\nwidth = {2**70}",
+            r"mine: scouts\.width is a whole number of about 2. digits",
+        ),
+        ("beam = [inf]", "mine: beam is inf, expected a finite number"),
+        ("beam = nan", "mine: beam is nan"),
+        ("beam = " + 2000 * "[", "mine: not valid TOML"),
+        ("beam = " + 3000 * "{a=", "mine: not valid TOML"),
+    ],
+)
+def test_absurd_numbers_and_depths_are_one_line_with_file_and_key(text, message):
+    with pytest.raises(InputError, match=message) as caught:
+        decode_toml(text, Search, "mine")
+    assert "\n" not in str(caught.value)
+    assert len(str(caught.value)) < 300

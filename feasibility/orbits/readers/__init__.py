@@ -1,0 +1,1 @@
+"""Readers of asteroid tables: one file a format, found by content."""
