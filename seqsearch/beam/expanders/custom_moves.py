@@ -5,6 +5,7 @@ from typing import Final, final
 
 from feasibility.classifier.predictor import LegPredictor
 from seqsearch.beam.counters import RankCounters
+from seqsearch.beam.expanders.finish import fly_best
 from seqsearch.beam.expanders.protocol import ExpanderTools
 from seqsearch.beam.frontiers.protocol import Frontier
 from seqsearch.core.candidates import Candidates, reached
@@ -13,7 +14,6 @@ from seqsearch.core.flown_hops import FlownHops
 from seqsearch.core.nodes import Nodes
 from seqsearch.deadline import Deadline
 from seqsearch.pruning.audit import Sample
-from seqsearch.pruning.hop_pruning import keep_hops
 from seqsearch.settings import SearchSettings
 
 _SOLVED: Final = 2.0
@@ -58,18 +58,9 @@ class CustomMovesExpander:
         chosen = frontier.admit(found, settings.beam_width, _SOLVED)
         best = Candidates.concatenate([candidates for candidates, _ in parts]).take(chosen)
         counters.count_pruned({"predictor": len(found) - len(chosen)})
-        survivors = keep_hops(tools.pruner, best.hops)
-        counters.count_kept(survivors)
-        sample.offer(best, survivors.mask)
-        best, found = best.take(survivors.mask), found.take(chosen).take(survivors.mask)
         counters.seconds_prune += time.perf_counter() - clock
-        if len(best) == 0 or deadline.passed():
-            return FlownHops.none()
-        clock = time.perf_counter()
-        promise = tools.ranking.score(found, tools.problem)
-        optimised = tools.optimiser.run_all(best, promise, settings, deadline)
-        counters.seconds_optimise = time.perf_counter() - clock
-        return FlownHops.of(tools.problem, nodes, best, optimised)
+        chosen_hops = best, found.take(chosen)
+        return fly_best(tools, nodes, chosen_hops, settings, counters, sample, deadline)
 
     def _candidates(
         self,

@@ -7,6 +7,7 @@ import numpy as np
 
 from feasibility.classifier.predictor import LegPredictor, lambert_final_mass
 from seqsearch.beam.counters import RankCounters
+from seqsearch.beam.expanders.finish import fly_best
 from seqsearch.beam.expanders.protocol import ExpanderTools
 from seqsearch.beam.forecast import Forecast, PairCurves, Survey
 from seqsearch.beam.frontiers.protocol import Frontier
@@ -16,7 +17,7 @@ from seqsearch.core.flown_hops import FlownHops
 from seqsearch.core.margin_curves import flight_times
 from seqsearch.core.nodes import Nodes
 from seqsearch.deadline import Deadline
-from seqsearch.pruning.audit import Sample
+from seqsearch.pruning.audit import NoSample, Sample
 from seqsearch.pruning.hop_pruning import keep_hops
 from seqsearch.settings import SearchSettings
 
@@ -73,17 +74,10 @@ class ForecastExpander:
         candidates = Candidates.concatenate([part for part, _ in parts])
         found = Nodes.concatenate([part for _, part in parts])
         counters.count_pruned({"predictor": counters.proposed - len(candidates)})
-        survivors = keep_hops(tools.pruner, candidates.hops)
-        counters.count_kept(survivors)
-        candidates, found = candidates.take(survivors.mask), found.take(survivors.mask)
         counters.seconds_prune += time.perf_counter() - clock
-        if len(candidates) == 0 or deadline.passed():
-            return FlownHops.none()
-        clock = time.perf_counter()
-        promise = tools.ranking.score(found, tools.problem)
-        optimised = tools.optimiser.run_all(candidates, promise, settings, deadline)
-        counters.seconds_optimise = time.perf_counter() - clock
-        return FlownHops.of(tools.problem, nodes, candidates, optimised)
+        # The audit has seen all candidates by now, not only the best.
+        best = candidates, found
+        return fly_best(tools, nodes, best, settings, counters, NoSample(), deadline)
 
     def _survey(
         self,

@@ -26,6 +26,7 @@ from seqsearch.problems.gtoc2.rules import Gtoc2Rules
 from seqsearch.problems.gtoc2.transfers import Transfers
 from seqsearch.problems.moves.earth_first import earth_first
 from seqsearch.problems.moves.lambert_departure import lambert_departure
+from seqsearch.problems.moves.launch_epochs import launch_epochs
 from seqsearch.problems.moves.questions import Questions
 from seqsearch.problems.variant import RendezvousVariant
 from seqsearch.settings import SearchSettings
@@ -114,13 +115,9 @@ class Gtoc2Problem(RendezvousVariant):
         return np.zeros(1, dtype=np.intp)
 
     def starts(self, settings: SearchSettings, rng: np.random.Generator, /) -> Nodes:
-        """Return launches, one from each of ``settings.starts`` equal slices of the window.
-
-        Their epochs within the slices are drawn, so that every pass sees others.
-        """
+        """Return ``settings.starts`` launches all over the window."""
         n = settings.starts
-        earliest, latest = self.first_departure_mjd2000
-        epochs = earliest + (np.arange(n) + rng.random(n)) / n * (latest - earliest)
+        epochs = launch_epochs(self.first_departure_mjd2000, n, rng)
         return self.start_nodes(np.zeros(n, dtype=np.intp), epochs)
 
     def candidates(

@@ -28,6 +28,7 @@ from seqsearch.problems.gtoc5.transfer_plans import TransferPlans
 from seqsearch.problems.moves.directions import even_directions
 from seqsearch.problems.moves.earth_first import earth_first
 from seqsearch.problems.moves.lambert_departure import lambert_departure
+from seqsearch.problems.moves.launch_epochs import launch_epochs
 from seqsearch.problems.variant import RendezvousVariant
 from seqsearch.settings import SearchSettings
 from seqsearch.tours.tour import TourRules
@@ -109,13 +110,9 @@ class Gtoc5Problem(RendezvousVariant):
         return np.zeros(1, dtype=np.intp)
 
     def starts(self, settings: SearchSettings, rng: np.random.Generator, /) -> Nodes:
-        """Return launches, one from each of ``settings.start_epochs`` equal slices of the window.
-
-        Their epochs within the slices are drawn, so that every pass sees others.
-        """
+        """Return ``settings.start_epochs`` launches all over the window."""
         n = settings.start_epochs
-        earliest, latest = self.first_departure_mjd2000
-        epochs = earliest + (np.arange(n) + rng.random(n)) / n * (latest - earliest)
+        epochs = launch_epochs(self.first_departure_mjd2000, n, rng)
         return self.start_nodes(np.zeros(n, dtype=np.intp), epochs)
 
     def candidates(
