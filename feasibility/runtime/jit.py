@@ -1,19 +1,23 @@
 """Compilation of the numeric kernels: one decorator, one cache, one announcement.
 
 Kernels are compiled on first use and cached on disk beside their source (or in
-numba's user cache where that folder is read-only), so worker processes and
-later runs load them in milliseconds. The first compilation in a process that
+numba's user cache where that folder is read-only, or else in the temporary folder), so
+worker processes and later runs load them in milliseconds. The first compilation in a process that
 finds no cache is announced on stderr, because it takes seconds.
 
 Numba looks only at a kernel's own file to see whether its cache is stale, but a
 compiled kernel contains the kernels that it calls. Here every kernel's cache
-also depends on the text of all kernel files of this package.
+also depends on the text of all kernel files of this package. Each level of optimisation
+(NUMBA_OPT) has a cache of its own, because results differ in the last digits.
 """
 
 import functools
 import gc
 import hashlib
+import multiprocessing
+import os
 import sys
+import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -67,16 +71,74 @@ def _compiled(function: _F, **options: bool | set[str]) -> _F:
     # The wrapper options are missing from numba's type hints.
     njit: Any = numba.njit
     # No cfunc wrapper: nothing calls kernels through C pointers.
-    compile_as: Any = njit(
-        cache=True, nogil=True, error_model="numpy", no_cfunc_wrapper=True, **options
-    )
+    compile_as: Any = njit(nogil=True, error_model="numpy", no_cfunc_wrapper=True, **options)
     compiled: Any = compile_as(function)
+    _enable_cache(compiled)
     # Private names of numba, so absence must do no harm; test_kernel_cache would tell.
-    index: Any = getattr(getattr(compiled, "_cache", None), "_cache_file", None)
+    cache: Any = getattr(compiled, "_cache", None)
+    index: Any = getattr(cache, "_cache_file", None)
+    config: Any = numba.config
     if index is not None and hasattr(index, "_source_stamp"):
-        index._source_stamp = (index._source_stamp, _kernel_sources_digest())
+        base = f"{cache._impl.filename_base}-opt{int(config.OPT)}"
+        stamp = (index._source_stamp, _kernel_sources_digest())
+        cache._cache_file = type(index)(cache.cache_path, base, stamp)
     typed: _F = compiled
     return typed
+
+
+def _enable_cache(compiled: Any) -> None:
+    """Cache a kernel where numba can write, else in the temporary folder, else not at all."""
+    try:
+        compiled.enable_caching()
+    except RuntimeError:
+        # Numba has no folder to write to: a read-only installation and no home.
+        folder = _temporary_cache()
+        if folder is not None:
+            _cache_in(folder, compiled)
+
+
+def _cache_in(folder: Path, compiled: Any) -> None:
+    config: Any = numba.config
+    before = config.CACHE_DIR
+    config.CACHE_DIR = str(folder)
+    try:
+        compiled.enable_caching()
+    except RuntimeError:
+        # The folder has become unusable meanwhile; the kernel works without.
+        return
+    finally:
+        # The caller's own functions are cached where the caller wants them.
+        config.CACHE_DIR = before
+
+
+@functools.cache
+def _temporary_cache() -> Path | None:
+    """Return a folder of this user alone for compiled kernels, None where there can be none."""
+    folder = _private_folder()
+    if multiprocessing.parent_process() is None:
+        place = f"they are cached in {folder}" if folder else "each process compiles them anew"
+        print(
+            "no folder for compiled kernels: neither the installation nor the home can be written "
+            f"to; {place} (the environment variable NUMBA_CACHE_DIR can name another folder)",
+            file=sys.stderr,
+            flush=True,
+        )
+    return folder
+
+
+def _private_folder() -> Path | None:
+    user = os.getuid() if hasattr(os, "getuid") else None
+    try:
+        folder = Path(tempfile.gettempdir()) / f"feasibility-kernels-{user or 0}"
+        folder.mkdir(mode=0o700, exist_ok=True)
+        found = folder.lstat()
+        tempfile.TemporaryFile(dir=folder).close()
+    except OSError:
+        return None
+    # Compiled kernels are code: nobody else may have put them there.
+    if user is not None and (found.st_uid != user or found.st_mode & 0o022):
+        return None
+    return folder
 
 
 @functools.cache

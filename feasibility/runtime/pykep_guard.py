@@ -13,7 +13,8 @@ the project can use pykep without knowing about them:
 
 The cure for 1 and 2 is to import pykep while empty modules stand in for
 ``heyoka`` and ``pykep.trajopt``. What is lost, pykep's zero-order-hold leg and
-its ready-made problems, is not used by this project.
+its ready-made problems, is not used by this project. Programs that need them import
+pykep before they use anything of this project that does: their pykep is left alone.
 """
 
 import functools
@@ -22,14 +23,19 @@ import importlib.util
 import sys
 import types
 import warnings
+from importlib.abc import MetaPathFinder
 from pathlib import Path
-from typing import Any
+from typing import Any, final
 
 import numpy as np
 
 from feasibility.errors import MissingDependencyError
 
 _STAND_INS = ("heyoka", "pykep.trajopt")
+_LEFT_OUT = (
+    "pykep.trajopt is not there: feasibility imported pykep without it, because pykep's wheel and "
+    "heyoka's cannot share a process safely; import pykep before you use feasibility to have it"
+)
 
 
 @functools.cache
@@ -103,12 +109,33 @@ def _import_with_stand_ins() -> Any:
     stand_ins["pykep.trajopt"].__dict__["mim_from_hop"] = _not_available
     sys.modules.update(stand_ins)
     try:
-        return importlib.import_module("pykep")
+        pykep = importlib.import_module("pykep")
     finally:
         # Whoever asks for the real modules later should get them, not our empty ones.
         for name in _STAND_INS:
             if sys.modules.get(name) is stand_ins[name]:
                 del sys.modules[name]
+    if pykep.__dict__.get("trajopt") is stand_ins["pykep.trajopt"]:
+        del pykep.trajopt
+        pykep.__dict__["__getattr__"] = _missing_attribute
+        sys.meta_path.insert(0, _NoTrajopt())
+    return pykep
+
+
+def _missing_attribute(name: str) -> None:
+    if name == "trajopt":
+        raise AttributeError(_LEFT_OUT)
+    raise AttributeError(f"module 'pykep' has no attribute {name!r}")
+
+
+@final
+class _NoTrajopt(MetaPathFinder):
+    """Says why `import pykep.trajopt` fails; the import itself ends in an obscure TypeError."""
+
+    def find_spec(self, fullname: str, _path: object = None, _target: object = None) -> None:
+        """Refuse the one module."""
+        if fullname == "pykep.trajopt":
+            raise ImportError(_LEFT_OUT, name=fullname)
 
 
 def _not_available(*_args: object, **_kwargs: object) -> None:

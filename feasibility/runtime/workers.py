@@ -27,10 +27,20 @@ _Answer = TypeVar("_Answer")
 _TRIES: Final = 3
 """How often a call is begun before its workers' deaths are taken for its own doing."""
 
+_DIED: Final = f"worker processes died {_TRIES} times in a row (killed, or out of memory)"
+_NEVER_STARTED: Final = (
+    "worker processes ended before they began to work; each imports the main program first, so "
+    "put what starts them under: if __name__ == '__main__':"
+)
+# Workers start from a clean process: forking one that has loaded threaded libraries can hang.
+_START_METHOD: Final = multiprocessing.get_context(
+    "forkserver" if sys.platform != "win32" else "spawn"
+)
+
 
 @final
 class WorkersLostError(BrokenExecutor):
-    """Worker processes died again and again over the same call."""
+    """Worker processes died again and again over the same call, or all as they started."""
 
 
 @final
@@ -57,7 +67,9 @@ class MendingPool(Executor):
         self._workers = workers
         self._lock = threading.Lock()
         self._closed = False
-        self._pool = _process_pool(workers)
+        _leave_if_the_main_program_runs_again()
+        self._started = _START_METHOD.Event()
+        self._pool = _process_pool(workers, self._started)
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
         """Call `fn` in a worker; the future raises `WorkersLostError` where the pool gives up."""
@@ -99,7 +111,7 @@ class MendingPool(Executor):
             if self._closed:
                 raise RuntimeError("the pool was shut down")
             if self._pool is broken:
-                self._pool = _process_pool(self._workers)
+                self._pool = _process_pool(self._workers, self._started)
                 self.mended += 1
 
     def _end(self, call: "_Call", pool: ProcessPoolExecutor, inner: Future[Any]) -> None:
@@ -112,12 +124,10 @@ class MendingPool(Executor):
             call.tries += 1
             try:
                 self._replace(pool)
-                if call.tries < _TRIES:
+                if call.tries < _TRIES and self._started.is_set():
                     self._begin(call)
                     return
-                error = WorkersLostError(
-                    f"worker processes died {_TRIES} times in a row (killed, or out of memory)"
-                )
+                error = WorkersLostError(_DIED if self._started.is_set() else _NEVER_STARTED)
             except RuntimeError as closed:
                 error = closed
         if not call.future.set_running_or_notify_cancel():
@@ -214,13 +224,28 @@ def worker_pool(workers: int) -> Iterator[MendingPool | None]:
         pool.shutdown(wait=True, cancel_futures=True)
 
 
-def _process_pool(workers: int) -> ProcessPoolExecutor:
-    # Workers start from a clean process: forking one that has loaded threaded libraries can hang.
-    context = multiprocessing.get_context("forkserver" if sys.platform != "win32" else "spawn")
-    return ProcessPoolExecutor(workers, mp_context=context, initializer=_prepare_worker)
+def _process_pool(workers: int, started: Any) -> ProcessPoolExecutor:
+    main: Any = sys.modules.get("__main__")
+    if getattr(main, "__file__", None) == "<stdin>":
+        # Workers would look for a file of this name; without it they import no main program.
+        del main.__file__
+    return ProcessPoolExecutor(
+        workers, mp_context=_START_METHOD, initializer=_prepare_worker, initargs=(started,)
+    )
 
 
-def _prepare_worker() -> None:
+def _leave_if_the_main_program_runs_again() -> None:
+    """End a worker whose main program, imported for the second time, asks for workers again.
+
+    multiprocessing would do so with a traceback for each; the first process says it in a line.
+    """
+    # Private, but as old as multiprocessing; without it the tracebacks are seen.
+    if getattr(multiprocessing.current_process(), "_inheriting", False):
+        os._exit(1)
+
+
+def _prepare_worker(started: Any) -> None:
+    started.set()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     # Workers use all processors already; threads of linear algebra would wait for each other:
     # with two workers on two processors small networks took six times as long.

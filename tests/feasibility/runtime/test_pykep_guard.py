@@ -128,3 +128,22 @@ def test_our_packages_do_not_import_pykep_or_pygmo_by_themselves():
         "print(sorted(heavy & set(sys.modules)))\n"
     )
     assert run.stdout == "[]\n", run.stderr
+
+
+def test_pykep_imported_after_us_works_and_says_what_it_lacks():
+    run = run_python(
+        SHORT_RUN + "import pykep as theirs\n"
+        "assert theirs is pykep and not hasattr(theirs, 'trajopt')\n"
+        "assert not hasattr(theirs, 'no_such_name')\n"
+        "for attempt in ('theirs.trajopt.mga', 'import pykep.trajopt',\n"
+        "                'from pykep.trajopt import mga'):\n"
+        "    try:\n"
+        "        exec(attempt)\n"
+        "    except (AttributeError, ImportError) as error:\n"
+        "        print(error)\n"
+        "assert not {'heyoka', 'pykep.trajopt'} & set(sys.modules)\n"
+    )
+    assert run.returncode == 0, run.stderr
+    lines = run.stdout.splitlines()
+    assert len(lines) == 3
+    assert all("import pykep before you use feasibility" in line for line in lines)

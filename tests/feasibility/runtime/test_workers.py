@@ -2,6 +2,8 @@
 
 import os
 import signal
+import subprocess
+import sys
 import time
 from concurrent.futures import CancelledError, wait
 from pathlib import Path
@@ -118,3 +120,37 @@ def test_a_process_pinned_to_one_processor_starts_one_worker(monkeypatch):
     monkeypatch.setattr(os, "sched_getaffinity", lambda _: {3}, raising=False)
     monkeypatch.setattr(os, "cpu_count", lambda: 64)
     assert default_workers() == 1
+
+
+UNGUARDED = """
+from feasibility.runtime.workers import worker_pool
+with worker_pool(2) as pool:
+    print(pool.submit(pow, 2, 5).result(60))
+"""
+
+
+def test_a_program_without_a_main_guard_is_told_so_in_one_line(tmp_path):
+    program = tmp_path / "program.py"
+    program.write_text(UNGUARDED)
+    done = subprocess.run(
+        [sys.executable, str(program)], capture_output=True, text=True, timeout=120, check=False
+    )
+    assert done.returncode == 1
+    assert done.stdout == ""
+    # One traceback, that of the first process.
+    assert done.stderr.count("Traceback") == 1 + done.stderr.count("direct cause")
+    assert "if __name__ == '__main__':" in done.stderr.splitlines()[-1]
+    assert "WorkersLostError" in done.stderr.splitlines()[-1]
+
+
+def test_a_program_from_standard_input_needs_no_guard():
+    done = subprocess.run(
+        [sys.executable, "-"],
+        input=UNGUARDED,
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert done.stdout == "32\n", done.stderr
+    assert done.stderr == ""
