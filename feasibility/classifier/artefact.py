@@ -38,6 +38,9 @@ FORMAT_VERSION: Final = 1
 _MAX_BYTES: Final = 256 << 20
 """Of an unpacked model: a file from elsewhere may be made to unpack to any size."""
 
+_LONGEST_REASON: Final = 200
+"""Characters: messages of zipfile may quote the file."""
+
 _MAX_MEMBERS: Final = 1000
 _KINDS: Final = "biufU"
 """Kinds of arrays that a model may have: numbers and words."""
@@ -143,8 +146,9 @@ class Artefact:
         except OSError as error:
             raise InputError(f"{path}: cannot be read ({error.strerror or error})") from None
         except Exception as error:  # a damaged archive makes zipfile raise nearly anything
+            reason = " ".join(str(error).split())[:_LONGEST_REASON]
             raise InputError(
-                f"{path}: not a model file, or damaged ({type(error).__name__}: {error})"
+                f"{path}: not a model file, or damaged ({type(error).__name__}: {reason})"
             ) from None
 
 

@@ -61,9 +61,7 @@ def _numbers(arrays: _Arrays, name: str, *shape: int | None) -> NDArray[Any]:
 
 
 def _one(arrays: _Arrays, name: str) -> float:
-    array = arrays[name]
-    _expect(array.size == 1 and array.dtype.kind in "biuf", f"array {name}, expected one number")
-    return float(array.reshape(-1)[0])
+    return float(_numbers(arrays, name))
 
 
 def _check_calibration(arrays: _Arrays) -> None:

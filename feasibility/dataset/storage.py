@@ -28,6 +28,7 @@ _DIGEST: Final = "sha256"
 """Where a part's schema and the metadata have their own checksum."""
 
 _MAX_SHARDS: Final = 1_000_000
+_LONGEST_REASON: Final = 200
 _MAX_ROWS: Final = 10_000_000
 """Of one shard."""
 
@@ -100,7 +101,7 @@ def read_shard(path: Path, rows: int, *, checksums: bool = False) -> dict[str, N
     except InputError:
         raise
     except Exception as error:  # a damaged file makes pyarrow raise nearly anything
-        reason = next(iter(str(error).splitlines()), type(error).__name__)
+        reason = next(iter(str(error).splitlines()), type(error).__name__)[:_LONGEST_REASON]
         raise InputError(f"{path}: not a readable Parquet file ({reason})") from None
     if digest is None and checksums:
         raise InputError(f"{path}: has no checksum; expected one as the other parts have")

@@ -23,6 +23,8 @@ def horizons_table(file: Path, lines: Sequence[str]) -> tuple[list[str], str] | 
     if "$$SOE" not in places:
         return None
     begin, end = places["$$SOE"], places.get("$$EOE", len(lines))
+    if end <= begin:
+        raise InputError(f"{file}, line {end + 1}: $$EOE before $$SOE, expected it behind")
     header = next((line for line in reversed(lines[:begin]) if line.strip("* ")), "")
     units = next((line for line in lines if line.startswith("Output units")), "AU-D")
     if "JDTDB" not in header or "," not in header:
