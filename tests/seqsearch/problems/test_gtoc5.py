@@ -427,7 +427,7 @@ def test_a_run_on_the_command_line_verifies_and_resumes_to_the_same_tour(tmp_pat
     problem.write_text(TOY)
     arguments = ["run", str(problem), "--out", str(out), "--workers", "1"]
     assert main(arguments) == 0
-    assert "score 2.0, 2 asteroids" in capsys.readouterr().out
+    assert "score 4.0, 4 asteroids" in capsys.readouterr().out
     whole = (out / "sequence.json").read_bytes()
     assert main(["verify", str(out), "--catalogue", str(tmp_path / "bodies.txt")]) == 0
     assert "speed of fly-bys" in capsys.readouterr().out
