@@ -5,28 +5,11 @@ import pytest
 
 from feasibility import Legs, optimise
 from feasibility.constants import AU, DAY_S, EARTH_VELOCITY, MU_SUN
-from feasibility.orbits import classical_to_cartesian
 from feasibility.orbits.lambert import lambert_delta_v
 from feasibility.sims_flanagan import solve_max_initial_mass
 from feasibility.sims_flanagan.fast.solver import fast_max_initial_mass, fast_min_propellant
 from feasibility.sims_flanagan.solutions import TWO_IMPULSE
-
-
-def long_legs(n: int, seed: int) -> Legs:
-    """Return legs of one to two revolutions between belt orbits."""
-    rng = np.random.default_rng(seed)
-    low = [2.2, 0.0, 0.0, 0.0, 0.0, 0.0]
-    high = [3.0, 0.15, 0.1, 2 * np.pi, 2 * np.pi, 2 * np.pi]
-    elements = rng.uniform(low, high, (2, n, 6)) * [AU, 1, 1, 1, 1, 1]
-    return Legs(
-        rv_dep=classical_to_cartesian(elements[0]),
-        rv_arr=classical_to_cartesian(elements[1]),
-        tof_days=rng.uniform(1200.0, 1700.0, n),
-        m0=1000.0,
-        thrust=0.6,
-        isp=4000.0,
-        m_dry=0.0,
-    )
+from tests.helpers.long_legs import long_legs
 
 
 def waiting_leg() -> Legs:

@@ -7,7 +7,7 @@ from scipy.integrate import solve_ivp
 from feasibility import InputError, Legs, impulses, max_initial_mass, optimise
 from feasibility.constants import AU, DAY_S, EARTH_VELOCITY, MU_SUN
 from feasibility.sims_flanagan import solve_max_initial_mass
-from tests.feasibility.sims_flanagan.test_light_legs import long_legs
+from tests.helpers.long_legs import long_legs
 
 
 def quarter_turn(**changes) -> Legs:
