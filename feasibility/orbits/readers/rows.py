@@ -9,7 +9,7 @@ from typing import Final, final
 
 from feasibility.errors import InputError
 from feasibility.orbits.readers.columns import FURTHER, JD_MJD, in_table_units
-from feasibility.orbits.readers.header import COMMENT, Header, split_cells
+from feasibility.orbits.readers.header import COMMENT, SEPARATORS, Header, split_cells
 
 _MAX_MJD: Final = 200_000.0
 _MIN_A_AU: Final = 1e-3
@@ -163,6 +163,11 @@ def _cells(line: str, header: Header) -> list[str]:
             return line.split(None, count - 1)
         name = " ".join(words[place : place + more + 1])
         return [*words[:place], name, *words[place + more + 1 :]]
+    for mark in SEPARATORS:
+        # The header has blanks, the rows have something else.
+        cells = split_cells(line, mark)
+        if len(cells) == count:
+            return cells
     raise _RowError(_wrong_count(len(words), header))
 
 
