@@ -19,18 +19,20 @@ JD_MJD: Final = 2_400_000.5
 _NAMES: Final = {
     "id": "id spkid num number no nr n# body_id asteroid_id index",
     "name": "name full_name fullname object designation desig pdes asteroid body target",
-    "epoch": "epoch t0 epoch_tdb epoch_tt jdtdb",
+    "epoch": "epoch t0 epoch_tdb epoch_tt",
     "a": "a sma semimajor_axis semi_major_axis semimajoraxis",
     "e": "e ec ecc eccentricity",
     "i": "i in inc incl inclin inclination",
     "node": "node om raan lan omega_upper longnode long_node asc_node ascending_node "
     "long_asc_node longitude_of_ascending_node longitude_of_the_ascending_node",
-    "argp": "w argp peri argperi arg_peri aop omega_lower arg_per arg_periap arg_perihelion "
-    "argument_of_perihelion argument_of_periapsis argument_of_pericenter",
+    "argp": "w argp peri argperi arg_peri aop omega_lower arg_per arg_periap arg_peric "
+    "arg_perihelion argument_of_perihelion argument_of_periapsis argument_of_pericenter",
     "M": "m ma mean_anomaly mean_anom meananomaly",
     "mass": "mass",
     "group": "group",
 }
+_DATES: Final = {"mjd": "mjd", "jd": "jd", "jdtdb": "jd", "mjd2000": "mjd2000"}
+"""Names of columns of epochs that tell the unit too."""
 _MEANING: Final = {name: column for column, names in _NAMES.items() for name in names.split()}
 
 _DEGREES: Final = ("deg", "degree", "degrees", "°")
@@ -100,20 +102,21 @@ def column_of(word: str, unit: str | None) -> Column:
             meaning = known
         else:
             suffix = ""
-    if name == "jdtdb":
-        suffix = "jd"
-    # A remark in parentheses, "(osculating, epoch in MJD)", is no unit.
-    given = "" if unit is None or re.search(r"[,\s]", unit.strip()) else unit.strip()
+    if name in _DATES:
+        meaning, suffix = "epoch", _DATES[name]
+    given = "" if unit is None else unit.strip()
     return Column(meaning, _known_unit(word, meaning, given or suffix), word)
 
 
 def _known_unit(word: str, meaning: str | None, unit: str) -> str:
     plain = unit.lower().rstrip(".")
-    if meaning is None or plain in _NO_UNIT:
+    known = None if meaning is None else _UNITS.get(meaning)
+    if known is None or plain in _NO_UNIT:
         return ""
-    known = _UNITS.get(meaning)
-    if known is None:
-        return ""
+    if re.search(r"[,;\s]", plain):
+        # A remark, such as "(JD, TDB)" or "(osculating, epoch in MJD)", may have a unit in it.
+        parts = [known.get(part.rstrip(".")) for part in re.split(r"[,;\s]+", plain)]
+        return next(filter(None, parts), "")
     if plain not in known:
         expected = ", ".join(dict.fromkeys(filter(None, known.values())))
         raise UnitError(f"unit ({unit}) of column {word} is not known; expected {expected}")

@@ -3,7 +3,7 @@
 import csv
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final, final
 
@@ -18,7 +18,7 @@ COMMENT: Final = ("#", "%", "!", "//")
 _PREAMBLE: Final = 60
 """Lines before a header that may hold anything."""
 
-_SEPARATORS: Final = (",", ";", "|")
+SEPARATORS: Final = (",", ";", "|")
 _PARENTHESES: Final = re.compile(r"\(([^)]*)\)|\[([^\]]*)\]")
 _WORD: Final = re.compile(r"([^\s(\[]+)\s*(?:\(([^)]*)\)|\[([^\]]*)\])?")
 _PHRASES: Final = {"arg. periap.": "argperi", "mean anomaly": "M"}
@@ -99,6 +99,7 @@ def find_header(
         except UnitError as error:
             faults.append(f"line {index + 1}: {error}")
             continue
+        columns = _with_units_first(columns)
         meanings = [column.meaning for column in columns]
         missing = [name for name in NEEDED if name not in meanings]
         if not missing:
@@ -134,7 +135,7 @@ def _without_mark(line: str) -> str:
 def _columns(line: str) -> tuple[tuple[Column, ...], str]:
     """Return the columns of a header and its separator."""
     bare = _PARENTHESES.sub("", line)
-    separator = next((mark for mark in _SEPARATORS if bare.rstrip(mark).count(mark) > 5), "")
+    separator = next((mark for mark in SEPARATORS if bare.rstrip(mark).count(mark) > 5), "")
     tabs = [cell.strip() for cell in line.split("\t")]
     if not separator and len(tabs) > 6 and all(tabs):
         separator = "\t"
@@ -161,6 +162,17 @@ def split_cells(line: str, separator: str) -> list[str]:
     else:
         cells = line.split(separator)
     return [cell.strip() for cell in cells]
+
+
+def _with_units_first(columns: tuple[Column, ...]) -> tuple[Column, ...]:
+    """Leave out columns of what another has with its unit: JPL has ``epoch`` and ``epoch_mjd``."""
+    told = [column.meaning for column in columns if column.unit]
+    return tuple(
+        replace(column, meaning=None)
+        if column.meaning in NEEDED and not column.unit and told.count(column.meaning) == 1
+        else column
+        for column in columns
+    )
 
 
 def _check_twice(file: Path, index: int, columns: Sequence[Column]) -> None:

@@ -71,7 +71,7 @@ def _row(number: int, line: str, found: re.Match[str], identity: int) -> Row | N
         values |= {"a": float(line[_A]), "epoch": _mjd(found["epoch"])}
     except ValueError:
         return None
-    if not (0.0 < values["a"] <= 1e4 and values["e"] < 1.0 and values["i"] <= 180.0):
+    if not (1e-3 <= values["a"] <= 1e4 and values["e"] < 1.0 and values["i"] <= 180.0):
         return None
     name = re.sub(r"^\(\d+\) *", "", line[_NAME].strip()) or found["id"]
     numbered = line[_NAME].strip().startswith("(")

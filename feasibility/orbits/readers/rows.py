@@ -9,9 +9,10 @@ from typing import Final, final
 
 from feasibility.errors import InputError
 from feasibility.orbits.readers.columns import FURTHER, JD_MJD, in_table_units
-from feasibility.orbits.readers.header import COMMENT, Header, split_cells
+from feasibility.orbits.readers.header import COMMENT, SEPARATORS, Header, split_cells
 
 _MAX_MJD: Final = 200_000.0
+_MIN_A_AU: Final = 1e-3
 _MAX_A_AU: Final = 1e4
 _JULIAN: Final = (2_000_000.0, 3_000_000.0)
 """Numbers of days that can only be Julian dates."""
@@ -22,7 +23,10 @@ _FORTRAN: Final = re.compile(r"([+-]?\d*\.?\d*)[dD]([+-]?\d+)")
 _QUOTED: Final = re.compile(r"'([^']+)'(?=\s)")
 
 _RANGES: Final[dict[str, tuple[Callable[[float], bool], str]]] = {
-    "a": (lambda x: 0.0 < x <= _MAX_A_AU, "a semi-major axis in AU, more than 0"),
+    "a": (
+        lambda x: _MIN_A_AU <= x <= _MAX_A_AU,
+        f"a semi-major axis in AU, more than 0: {_MIN_A_AU:g} to {_MAX_A_AU:g}",
+    ),
     "e": (lambda x: 0.0 <= x < 1.0, "an eccentricity of an ellipse, 0 <= e < 1"),
     "i": (lambda x: 0.0 <= x <= 180.0, "an inclination of 0 to 180 degrees"),
     "node": (lambda x: abs(x) <= 720.0, "an angle in degrees"),
@@ -159,6 +163,11 @@ def _cells(line: str, header: Header) -> list[str]:
             return line.split(None, count - 1)
         name = " ".join(words[place : place + more + 1])
         return [*words[:place], name, *words[place + more + 1 :]]
+    for mark in SEPARATORS:
+        # The header has blanks, the rows have something else.
+        cells = split_cells(line, mark)
+        if len(cells) == count:
+            return cells
     raise _RowError(_wrong_count(len(words), header))
 
 

@@ -54,6 +54,14 @@ HEADERS = {
     "kilometres": "id epoch a(km) e i node argp M\n3 54800 373994676.75 0.1 7 100 200 300\n",
     "metres": "id epoch a_m e i node argp M\n3 54800 3.7399467675e11 0.1 7 100 200 300\n",
     "dotted names": "spkid,epoch.mjd,a,e,inc,raan,aop,ma\n3,54800,2.5,0.1,7,100,200,300\n",
+    "epochs twice": "spkid,epoch,epoch_mjd,epoch_cal,a,e,i,om,w,ma\n"
+    "3,2454800.5,54800,20081130.0,2.5,0.1,7,100,200,300\n",
+    "a name that is a unit": "id mjd a e i node argp M\n3 54800 2.5 0.1 7 100 200 300\n",
+    "remarks with units": "id epoch (JD, TDB) a (in AU) e i (in rad) node (rad) w (rad) M (rad)\n"
+    f"3 2454800.5 2.5 0.1 {RADIANS}\n",
+    "commas below a header of blanks": "id epoch a e i node argp M\n3,54800,2.5,.1,7,100,200,300\n",
+    "blanks below a header of commas": "! Name, Epoch(MJD), a, e, i, long. node, arg. peric., "
+    "mean anomaly, absolute magnitude\n'3'  54800.0 2.5E+00 1E-1 7E+00 1E+02 2E+2 3E+2 3.35\n",
     "commas and quotes": 'full_name,epoch_mjd,a,e,i,om,w,ma\n"3 A, B",54800,2.5,.1,7,100,200,300\n',
     "bars": "| id | epoch | a | e | i | Omega | omega | M |\n"
     "|---|---|---|---|---|---|---|---|\n| 3 | 54800 | 2.5 | 0.1 | 7 | 100 | 200 | 300 |\n",
