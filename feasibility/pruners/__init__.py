@@ -12,7 +12,7 @@
 A pruner of one's own is any object with a method `keep(legs) -> (n,) bool` that
 honours the contract of `Pruner`: row-wise, pure, picklable. `check_pruner`
 tests just that and raises `PrunerContractError` with one line that says what is
-wrong:
+wrong (`quick_check` does part of it in milliseconds):
 
 >>> from dataclasses import dataclass
 >>> import numpy as np
@@ -71,7 +71,7 @@ size of a batch.
 
 from feasibility.pruners.all_of import AllOf, pruner_name
 from feasibility.pruners.asking import PrunerContractError
-from feasibility.pruners.check import check_pruner
+from feasibility.pruners.check import check_pruner, quick_check
 from feasibility.pruners.classifier import ClassifierPruner
 from feasibility.pruners.keep_all import KeepAll
 from feasibility.pruners.lambert import LambertPruner
@@ -89,4 +89,5 @@ __all__ = [
     "PrunerContractError",
     "check_pruner",
     "pruner_name",
+    "quick_check",
 ]

@@ -15,7 +15,20 @@ class PrunerContractError(AssertionError):
 
 
 def ask(pruner: Pruner, legs: Legs) -> NDArray[np.bool_]:
-    """Return (n,) what a pruner keeps of n legs.
+    """Return (n,) what a pruner keeps of n legs; it is not called where there are none.
+
+    Many models of others, scikit-learn's among them, refuse a batch without rows.
+
+    Raises
+    ------
+    PrunerContractError
+        As for `answer`.
+    """
+    return answer(pruner, legs) if len(legs) else np.zeros(0, dtype=np.bool_)
+
+
+def answer(pruner: Pruner, legs: Legs) -> NDArray[np.bool_]:
+    """Return (n,) what a pruner keeps of n legs, be there none.
 
     Raises
     ------

@@ -18,7 +18,8 @@ class Pruner(Protocol):
     - row-wise: the answer for a leg depends on that leg alone, not on its
       position or its neighbours, so that a search may split and merge batches;
     - pure: the same legs get the same answer, and the legs are not changed;
-    - no legs is a legal batch, and so is an answer that is all False;
+    - an answer that is all False is legal, and so is a batch without legs: `check_pruner`
+      asks about one, but no search does, so that a model which refuses it works there;
     - picklable, so that it can travel to worker processes.
 
     Examples

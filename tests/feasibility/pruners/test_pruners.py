@@ -1,6 +1,7 @@
 """The pruners and the check of their contract."""
 
 import pickle
+import time
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -19,6 +20,7 @@ from feasibility.pruners import (
     Pruner,
     PrunerContractError,
     check_pruner,
+    quick_check,
 )
 
 
@@ -121,6 +123,65 @@ def test_each_breach_of_the_contract_is_named_in_one_line(pruner, message):
         check_pruner(pruner)
     assert message in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_a_quick_check_finds_most_breaches():
+    for pruner in (
+        _By(lambda legs: np.ones(len(legs) + 1, bool)),
+        _By(lambda legs: np.ones(len(legs))),
+        _By(lambda legs: [True] * len(legs)),
+        _By(_position),
+        _By(_median),
+        _By(_spoil),
+        _Alternating(),
+        AllOf(KeepAll(), AllOf(_By(_position))),
+    ):
+        with pytest.raises(PrunerContractError) as caught:
+            quick_check(pruner)
+        assert "\n" not in str(caught.value)
+
+
+def test_a_quick_check_of_a_fast_pruner_takes_no_time_and_ours_are_not_asked():
+    class Broken(BaseException):
+        """Not caught by anything that asks a pruner."""
+
+    def refuse(_):
+        raise Broken
+
+    began = time.process_time()
+    quick_check(_By(_drop_all))
+    assert time.process_time() - began < 0.05
+    for pruner in SHIPPED:
+        quick_check(pruner)
+    with pytest.raises(Broken):
+        quick_check(AllOf(_By(refuse)))
+
+
+def test_a_model_that_refuses_no_legs_is_not_asked_about_none():
+    picky = _By(_nothing_on_none)
+    with pytest.raises(ValueError, match="zero-size"):
+        picky.keep(varied_legs(np.random.default_rng(1)).take(np.arange(0)))
+    legs = varied_legs(np.random.default_rng(1))
+    assert not AllOf(_By(_drop_all), picky).keep(legs).any()
+    assert AllOf(picky).keep(legs.take(np.arange(0))).shape == (0,)
+
+
+def test_a_bare_scikit_learn_model_is_a_pruner():
+    tree = pytest.importorskip("sklearn.tree")
+
+    class Plain:
+        def __init__(self, model):
+            self.model = model
+
+        def keep(self, legs, /):
+            return self.model.predict(np.column_stack([legs.tof_days, legs.m0])).astype(bool)
+
+    legs = varied_legs(np.random.default_rng(1))
+    inputs = np.column_stack([legs.tof_days, legs.m0])
+    pruner = Plain(tree.DecisionTreeClassifier().fit(inputs, legs.tof_days < 300.0))
+    quick_check(pruner)
+    np.testing.assert_array_equal(AllOf(pruner).keep(legs), legs.tof_days < 300.0)
+    assert not AllOf(_By(_drop_all), pruner).keep(legs).any()
 
 
 def test_mima_pruners_compare_with_the_initial_mass():
