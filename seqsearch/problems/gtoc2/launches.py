@@ -23,19 +23,19 @@ from seqsearch.problems.moves.questions import Questions
 _Array = NDArray[np.float64]
 _Rows = NDArray[np.intp]
 
-_TARGETS: Final = 40
+_TARGETS: Final = 30
 _PURSUED: Final = 12
 """Targets of a launch epoch before and after its directions are known."""
 
-_DIRECTIONS: Final = 8
-"""Directions on half of the sphere, some 45 degrees apart."""
+_DIRECTIONS: Final = 6
+"""Directions on half of the sphere, some 50 degrees apart."""
 
-_TURNS_RAD: Final = (0.45, 0.22, 0.11)
+_TURNS_RAD: Final = (0.5, 0.25, 0.12)
 _AROUND: Final = 6
 """Angles by which the best direction is turned, one after another, each to so many sides."""
 
 _TIMES: Final = (80.0, 900.0)
-_COARSE: Final = 6
+_COARSE: Final = 5
 _FINE: Final = 12
 """Flight times that are asked about: the first and last one in days, and how many."""
 

@@ -350,7 +350,7 @@ def test_the_built_in_problem_has_the_figures_of_the_statement(shared):
 def test_near_earth_asteroids_come_first_on_the_official_table(shared):
     problem = build_problem(with_catalogue(read_config("gtoc2"), str(shared / GTOC2_TABLE)))
     nodes = problem.start_nodes(np.array([0]), np.array([8000.0]))
-    pairs = Prospects(problem.outlook, nodes).pairs(np.array([0]), 3500.0, 40)
+    pairs = Prospects(problem.outlook, nodes).pairs(np.array([0]), 3500.0, 30)
     assert set(problem.catalogue.ids[pairs.target]) < set(problem.group_ids[3])
     # The first asteroids of the five best tours of the competition's winners.
     winners = {3258076, 3070801, 3329255, 3250293}
