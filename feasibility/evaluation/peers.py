@@ -19,6 +19,7 @@ from feasibility.evaluation.metrics import Confusion, auc
 from feasibility.legs import Legs
 from feasibility.orbits.lambert import lambert_delta_v
 from feasibility.orbits.mima import mima, mima2
+from feasibility.orbits.transfer_plane import in_line, levelled_targets
 
 _Array = NDArray[np.float64]
 
@@ -137,20 +138,30 @@ def lambert_score(legs: Legs) -> _Array:
     mass, whichever is the tighter.
     """
     exhaust = legs.exhaust_velocity
-    needed = lambert_delta_v(legs.rv_dep, legs.rv_arr, legs.tof_s, MAX_REVS)
+    needed = lambert_delta_v(legs.rv_dep, _targets(legs), legs.tof_s, MAX_REVS)
     with np.errstate(divide="ignore"):
         heaviest = legs.thrust * legs.tof_s / (exhaust * -np.expm1(-needed / exhaust))
         room = np.log(legs.m0 / legs.m_dry) - needed / exhaust
     score: _Array = np.minimum(np.log(heaviest / legs.m0), room)
-    return np.where(np.isfinite(needed), score, -np.inf)
+    return _kept_in_line(legs, np.where(np.isfinite(needed), score, -np.inf))
 
 
 def _heavy(estimate: Callable[..., _Array], legs: Legs) -> _Array:
     mass = estimate(
-        legs.rv_dep, legs.rv_arr, legs.tof_s, legs.thrust, legs.exhaust_velocity, MAX_REVS
+        legs.rv_dep, _targets(legs), legs.tof_s, legs.thrust, legs.exhaust_velocity, MAX_REVS
     )
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.asarray(np.log(mass / legs.m0))
+        return _kept_in_line(legs, np.asarray(np.log(mass / legs.m0)))
+
+
+def _targets(legs: Legs) -> _Array:
+    """Return the arrival states as the pruners of closed forms take them."""
+    return levelled_targets(legs.rv_dep, legs.rv_arr, legs.tof_s, MU_SUN)
+
+
+def _kept_in_line(legs: Legs, score: _Array) -> _Array:
+    """Return scores that are infinite where the pruners keep a leg that they cannot judge."""
+    return np.where(in_line(legs.rv_dep, legs.rv_arr), np.inf, score)
 
 
 def _neural_score(package: Any, legs: Legs) -> _Array:

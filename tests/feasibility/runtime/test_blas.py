@@ -21,7 +21,9 @@ def test_what_was_set_before_returns_when_the_last_has_left():
             with one_blas_thread():
                 assert _threads() == {1}
             assert _threads() == {1}
-        assert _threads() == before == {2}
+        assert _threads() == before
+        # Some libraries have a single thread, whatever they are told.
+        assert 2 in before
 
 
 def test_threads_that_come_and_go_leave_what_was_set():
@@ -31,9 +33,10 @@ def test_threads_that_come_and_go_leave_what_was_set():
                 pass
 
     with threadpool_limits(2, "blas"):
+        before = _threads()
         others = [threading.Thread(target=work) for _ in range(4)]
         for other in others:
             other.start()
         for other in others:
             other.join()
-        assert _threads() == {2}
+        assert _threads() == before
