@@ -60,8 +60,8 @@ def compile_second_half() -> None:
 
     w, six, impulses, batch = _examples()
     with rare_collections():
-        _compile(close, six, impulses, 2, 1.0, six, 1.0, 1, w)
-        _compile(polish, six, impulses, 2, 1, 1.0, 1.0, six, w)
+        _compile(close, six, impulses, 2, six, 1.0, 1, w)
+        _compile(polish, six, impulses, 2, 1, 1.0, six, w)
         rows, numbers = batch
         throttles = np.zeros((1, 2, 3))
         leg = (rows, rows, numbers, numbers, numbers, 2, 1.0, throttles, numbers)
@@ -79,7 +79,7 @@ def _compile_first_half() -> None:
     _compile(least_thrust, w.b[0], six, 2, 1, 1.0, six, 1.0, impulses, impulses, w)
     _compile(
         lifted_sweep,
-        *(six, six, 1.0, 1.0, 2, 1, 1.0, True, True, nodes, impulses, 1.0, six, w),
+        *(six, six, 1.0, 2, 1, 1.0, True, True, nodes, impulses, 1.0, six, w),
     )
     _compile(advance, nodes, impulses, 2, 1.0, 1, w)
     _compile(
@@ -94,7 +94,7 @@ def _examples() -> tuple[Any, Any, Any, tuple[Any, Any]]:
     from feasibility.sims_flanagan.fast.workspace_kernels import Workspace
 
     four, three, two = np.zeros((1, 1, 1, 1)), np.zeros((1, 1, 1)), np.zeros((1, 1))
-    workspace = Workspace(three, three, four, three, two, two)
+    workspace = Workspace(three, three, four, three, two, two, two)
     return workspace, np.zeros(6), np.zeros((2, 3)), (np.zeros((1, 6)), np.zeros(1))
 
 

@@ -12,6 +12,8 @@ from feasibility.sims_flanagan.fast.algebra_kernels import (
     solve_lower_transposed,
 )
 from feasibility.sims_flanagan.fast.workspace_kernels import (
+    ALONG,
+    FREE,
     HESSIAN,
     HESSIAN_LOWER,
     NORM,
@@ -22,8 +24,10 @@ from feasibility.sims_flanagan.fast.workspace_kernels import (
     TRIAL_NORM,
     TRIAL_PRIMER,
     TURNED,
+    WEIGHT,
     Workspace,
     Y,
+    has_free_ends,
 )
 
 _DUAL_ITERATIONS = 40
@@ -31,23 +35,32 @@ _SOFTNESS = 1e-3
 _FULL = 0.995
 _LARGEST = 2.0
 _BACKWARD_LIMIT = 0.367
+_NO_THRUST = 1e-9
+_ROUNDS = 12
+_MET = 1e-7
 
 _Array = NDArray[np.float64]
 
 
 @inner_kernel
-def full_thrust_profile(z: float, n: int, n_forward: int, y: _Array, slope: _Array) -> None:
+def full_thrust_profile(
+    z: float, n: int, n_forward: int, c: float, free: _Array, y: _Array, slope: _Array
+) -> None:
     """Write impulses over exhaust velocity, y_i, at full thrust, and their derivative by z.
 
     z = T dt / (m0 c). Forward half (mass before the impulse): y = z_i; backward
     half (mass after it): y exp(-y) = z_i; both z_(i+1) = z_i exp(y_i). Beyond
     z_i = 1/e the convention sets a backward impulse no limit at all (the mass
-    left is as small as it needs to be); there y = 1.
+    left is as small as it needs to be); there y = 1. Of a free end y is its bound `free` over
+    exhaust velocity `c`, whatever z is.
     """
     zi = z
     dz = 1.0
     for i in range(n):
-        if i < n_forward:
+        if free[i] > 0.0:
+            y[i] = free[i] / c
+            slope[i] = 0.0
+        elif i < n_forward:
             zi = min(zi, _LARGEST)
             y[i] = zi
             slope[i] = dz
@@ -73,15 +86,18 @@ def full_thrust_profile(z: float, n: int, n_forward: int, y: _Array, slope: _Arr
 
 
 @inner_kernel
-def z_of_impulses(dv: _Array, n: int, n_forward: int, c: float) -> float:
+def z_of_impulses(dv: _Array, n: int, n_forward: int, c: float, free: _Array) -> float:
     """Return the smallest z = T dt / (m0 c) at which the impulses need no throttle above 1.
 
     m0 exp(-S_i / c) |dv_i| <= T dt with S_i the sum of the impulses before
-    segment i, in the backward half including it.
+    segment i, in the backward half including it. The excess of free ends, where `free` is
+    not 0, needs no thrust.
     """
     total = 0.0
     z = 0.0
     for i in range(n):
+        if free[i] > 0.0:
+            continue
         y = math.sqrt(dv[i, 0] ** 2 + dv[i, 1] ** 2 + dv[i, 2] ** 2) / c
         if i < n_forward:
             z = max(z, y * math.exp(-total))
@@ -93,19 +109,43 @@ def z_of_impulses(dv: _Array, n: int, n_forward: int, c: float) -> float:
 
 
 @inner_kernel
-def whiten(b: _Array, n: int, gram: _Array, lower: _Array) -> bool:
-    """Overwrite each b_i (6, 3) with L^-1 b_i, where L L^T = sum b_i b_i^T; return whether it can.
+def correction_matrix(b: _Array, n: int, gram: _Array, w: Workspace) -> None:
+    """Write sum b_i b_i^T: how the end answers to corrections.
 
-    In whitened coordinates the norm of a gap is the least impulse that closes it.
+    Free ends count with their weights, and across the excess only where it is at its bound.
     """
     for i in range(6):
         for j in range(i + 1):
             total = 0.0
             for k in range(n):
+                if w.s[FREE, k] > 0.0:
+                    continue
                 total += (
                     b[k, i, 0] * b[k, j, 0] + b[k, i, 1] * b[k, j, 1] + b[k, i, 2] * b[k, j, 2]
                 )
             gram[i, j] = total
+    for k in range(0, n, max(n - 1, 1)):
+        if not w.s[FREE, k] > 0.0:
+            continue
+        a = w.n3[ALONG, k]
+        for i in range(6):
+            along = b[k, i, 0] * a[0] + b[k, i, 1] * a[1] + b[k, i, 2] * a[2]
+            for j in range(i + 1):
+                gram[i, j] += w.s[WEIGHT, k] * (
+                    b[k, i, 0] * b[k, j, 0]
+                    + b[k, i, 1] * b[k, j, 1]
+                    + b[k, i, 2] * b[k, j, 2]
+                    - along * (b[k, j, 0] * a[0] + b[k, j, 1] * a[1] + b[k, j, 2] * a[2])
+                )
+
+
+@inner_kernel
+def whiten(b: _Array, n: int, gram: _Array, lower: _Array, w: Workspace) -> bool:
+    """Overwrite each b_i (6, 3) with L^-1 b_i, where L L^T = sum b_i b_i^T; return whether it can.
+
+    In whitened coordinates the norm of a gap is the least impulse that closes it.
+    """
+    correction_matrix(b, n, gram, w)
     if not cholesky(gram, lower):
         return False
     for k in range(n):
@@ -120,13 +160,16 @@ def whiten(b: _Array, n: int, gram: _Array, lower: _Array) -> bool:
 
 @inner_kernel
 def _primers(
-    b: _Array, lam: _Array, n: int, thrust: _Array, pinned: _Array, primer: _Array, norm: _Array
-) -> None:
+    b: _Array, lam: _Array, n: int, thrust: _Array, primer: _Array, norm: _Array, w: Workspace
+) -> float:
     """Write b_i^T lam and the softened norms sqrt(|b_i^T lam|^2 + eps^2).
 
-    For a pinned segment the "norm" is the work done along its given direction.
+    For a pinned segment the "norm" is the work done along its given direction. Returns the work
+    that free ends do at their bounds.
     """
+    pinned, free = w.s[PINNED], w.s[FREE]
     mean = 0.0
+    excess = 0.0
     for i in range(n):
         total = 0.0
         for j in range(3):
@@ -136,24 +179,38 @@ def _primers(
             primer[i, j] = p
             total += p * p
         norm[i] = total
-        mean += total
+        if free[i] == 0.0:
+            mean += total
     eps2 = _SOFTNESS * _SOFTNESS * mean / n
     for i in range(n):
-        if pinned[i] > 0.0:
+        if free[i] > 0.0:
+            # As much softer work as a segment's.
+            norm[i] = math.sqrt(norm[i] + eps2 / w.s[WEIGHT, i])
+            excess += free[i] * norm[i]
+        elif pinned[i] > 0.0:
             norm[i] = 0.0
             for j in range(3):
                 norm[i] += primer[i, j] * thrust[i, j]
         else:
             norm[i] = math.sqrt(norm[i] + eps2)
+    return excess
 
 
 @inner_kernel
 def _bound(
-    norm: _Array, work: float, z: float, n: int, n_forward: int, c: float, y: _Array, slope: _Array
+    norm: _Array,
+    work: float,
+    z: float,
+    n: int,
+    n_forward: int,
+    c: float,
+    free: _Array,
+    y: _Array,
+    slope: _Array,
 ) -> float:
     """Return the z at which full thrust along the primers just does `work`: c sum y_i |p_i|."""
     for _ in range(30):
-        full_thrust_profile(z, n, n_forward, y, slope)
+        full_thrust_profile(z, n, n_forward, c, free, y, slope)
         done = 0.0
         rate = 0.0
         for i in range(n):
@@ -225,14 +282,14 @@ def _climb(
     """Raise z(lam) by damped Newton steps from `lam` (norm 1); return z, -1 where it fails."""
     primer, trial_primer, thrust = w.n3[PRIMER], w.n3[TRIAL_PRIMER], w.n3[THRUST]
     norm, trial_norm, y, slope = w.s[NORM], w.s[TRIAL_NORM], w.s[Y], w.s[SLOPE]
-    pinned = w.s[PINNED]
+    pinned, free = w.s[PINNED], w.s[FREE]
     h, lower, turned = w.m[HESSIAN], w.m[HESSIAN_LOWER], w.m[TURNED]
     grad, step, trial = turned[2], turned[3], turned[4]
     work = 0.0
     for i in range(6):
         work += lam[i] * gap[i]
-    _primers(b, lam, n, thrust, pinned, primer, norm)
-    z = _bound(norm, work, z, n, n_forward, c, y, slope)
+    excess = _primers(b, lam, n, thrust, primer, norm, w)
+    z = _bound(norm, work, z, n, n_forward, c, free, y, slope)
     for i in range(n):
         if pinned[i] == 0.0:
             for j in range(3):
@@ -254,7 +311,7 @@ def _climb(
         decrement = 0.0
         for i in range(6):
             decrement -= step[i] * grad[i]
-        if not decrement > 1e-8 * work:
+        if not decrement > 1e-8 * (work - excess):
             break
         fraction = 1.0
         better = False
@@ -269,11 +326,14 @@ def _climb(
                 trial[i] /= size
                 trial_work += trial[i] * gap[i]
             if trial_work > 0.0:
-                _primers(b, trial, n, thrust, pinned, trial_primer, trial_norm)
-                trial_z = _bound(trial_norm, trial_work, z, n, n_forward, c, y, slope)
-                if trial_z > z:
-                    better = True
-                    break
+                trial_excess = _primers(b, trial, n, thrust, trial_primer, trial_norm, w)
+                if trial_work > trial_excess:
+                    trial_z = _bound(
+                        trial_norm, trial_work, z, n, n_forward, c, free, y, slope
+                    )
+                    if trial_z > z:
+                        better = True
+                        break
             fraction *= 0.5
         if not better:
             break
@@ -282,13 +342,14 @@ def _climb(
                 _turn_thrust(b[k], step, fraction, primer[k], norm[k], thrust[k])
         z = trial_z
         work = trial_work
+        excess = trial_excess
         for i in range(6):
             lam[i] = trial[i]
         for i in range(n):
             norm[i] = trial_norm[i]
             for j in range(3):
                 primer[i, j] = trial_primer[i, j]
-    full_thrust_profile(z, n, n_forward, y, slope)
+    full_thrust_profile(z, n, n_forward, c, free, y, slope)
     return z
 
 
@@ -364,6 +425,100 @@ def _pin_direction(b: _Array, lower: _Array, turned: _Array, u: _Array) -> None:
 
 
 @inner_kernel
+def _beyond_ends(
+    b: _Array, gap: _Array, n: int, lam: _Array, dv: _Array, w: Workspace
+) -> bool:
+    """Write into `lam` what is left of a gap that free ends close as far as they can.
+
+    Along this direction the ends do less work than the gap asks for. Where nothing is left,
+    returns False and leaves the excess velocities, alone, in `dv`.
+    """
+    matrix, rest = w.m[TURNED], w.m[HESSIAN]
+    for i in range(n):
+        for j in range(3):
+            dv[i, j] = 0.0
+    total = 0.0
+    for k in range(6):
+        total += gap[k] * gap[k]
+    left = np.inf
+    for _ in range(_ROUNDS):
+        for i in range(0, n, max(n - 1, 1)):
+            if w.s[FREE, i] > 0.0:
+                for k in range(6):
+                    value = gap[k]
+                    for e in range(0, n, max(n - 1, 1)):
+                        if e != i:
+                            for j in range(3):
+                                value -= b[e, k, j] * dv[e, j]
+                    rest[0, k] = value
+                _nearest_in_ball(b[i], rest[0], w.s[FREE, i], matrix, dv[i])
+        before = left
+        left = 0.0
+        for k in range(6):
+            lam[k] = gap[k]
+            for e in range(0, n, max(n - 1, 1)):
+                for j in range(3):
+                    lam[k] -= b[e, k, j] * dv[e, j]
+            left += lam[k] * lam[k]
+        if left < _MET * _MET * total or left > 0.99 * before:
+            break
+    return left > _MET * _MET * total
+
+
+@inner_kernel
+def _nearest_in_ball(b: _Array, rest: _Array, radius: float, m: _Array, e: _Array) -> None:
+    """Write the vector `e` (3,), no longer than `radius`, with the least |rest - b e|.
+
+    (b^T b + tau) e = b^T rest with tau of 0 or more, by a bisection in its logarithm.
+    """
+    trace = 0.0
+    for i in range(3):
+        for j in range(i + 1):
+            value = 0.0
+            for k in range(6):
+                value += b[k, i] * b[k, j]
+            m[i, j] = value
+        trace += m[i, i]
+        m[3, i] = 0.0
+        for k in range(6):
+            m[3, i] += b[k, i] * rest[k]
+    size = math.sqrt(m[3, 0] ** 2 + m[3, 1] ** 2 + m[3, 2] ** 2)
+    _solve_three(m, 1e-14 * trace, e)
+    if e[0] ** 2 + e[1] ** 2 + e[2] ** 2 <= radius * radius:
+        return
+    low = math.log(1e-14 * trace)
+    high = math.log(max(size / radius, 1e-13 * trace))
+    for _ in range(40):
+        middle = 0.5 * (low + high)
+        _solve_three(m, math.exp(middle), e)
+        if e[0] ** 2 + e[1] ** 2 + e[2] ** 2 <= radius * radius:
+            high = middle
+        else:
+            low = middle
+        if high - low < 1e-10:
+            break
+    _solve_three(m, math.exp(high), e)
+
+
+@inner_kernel
+def _solve_three(m: _Array, tau: float, x: _Array) -> None:
+    """Write the solution of (m + tau) x = m[3] for the symmetric (3, 3) matrix in m's triangle."""
+    a00, a11, a22 = m[0, 0] + tau, m[1, 1] + tau, m[2, 2] + tau
+    a01, a02, a12 = m[1, 0], m[2, 0], m[2, 1]
+    c00 = a11 * a22 - a12 * a12
+    c01 = a02 * a12 - a01 * a22
+    c02 = a01 * a12 - a02 * a11
+    c11 = a00 * a22 - a02 * a02
+    c12 = a01 * a02 - a00 * a12
+    c22 = a00 * a11 - a01 * a01
+    det = a00 * c00 + a01 * c01 + a02 * c02
+    g0, g1, g2 = m[3, 0], m[3, 1], m[3, 2]
+    x[0] = (c00 * g0 + c01 * g1 + c02 * g2) / det
+    x[1] = (c01 * g0 + c11 * g1 + c12 * g2) / det
+    x[2] = (c02 * g0 + c12 * g1 + c22 * g2) / det
+
+
+@inner_kernel
 def least_thrust(
     b: _Array,
     gap: _Array,
@@ -389,6 +544,8 @@ def least_thrust(
     the start, so it pays to thrust fully even there, in the direction that the other
     segments make up for most cheaply; `now` settles its sign where both are alike.
 
+    Free ends are impulses with bounds of their own that do not depend on z, and may be shorter.
+
     `b` and `gap` are whitened; `lam` holds the first guess and receives the
     solution, norm 1.
     """
@@ -399,7 +556,14 @@ def least_thrust(
     work = 0.0
     for i in range(6):
         work += lam[i] * gap[i]
-    if not work > 0.0:
+    for i in range(n):
+        pinned[i] = 0.0
+    if has_free_ends(n, w):
+        excess = _primers(b, lam, n, thrust, primer, norm, w)
+        if not work > excess and not _beyond_ends(b, gap, n, lam, dv, w):
+            # The ends close the gap alone.
+            return _NO_THRUST
+    elif not work > 0.0:
         for i in range(6):
             lam[i] = gap[i]
     size = 0.0
@@ -410,8 +574,6 @@ def least_thrust(
         return -1.0
     for i in range(6):
         lam[i] /= size
-    for i in range(n):
-        pinned[i] = 0.0
     z = _climb(b, gap, n, n_forward, c, lam, z, w)
     if not z > 0.0:
         return -1.0
@@ -421,7 +583,7 @@ def least_thrust(
         for j in range(3):
             thrust[i, j] = primer[i, j] / norm[i]
             total += thrust[i, j] ** 2
-        if total < _FULL * _FULL:
+        if total < _FULL * _FULL and w.s[FREE, i] == 0.0:
             pinned[i] = 1.0
             some = True
     if some:

@@ -5,7 +5,6 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.orbits.kepler_kernels import propagate
 from feasibility.runtime.jit import inner_kernel
 from feasibility.sims_flanagan.fast.algebra_kernels import (
     cholesky,
@@ -14,6 +13,7 @@ from feasibility.sims_flanagan.fast.algebra_kernels import (
     solve_lower,
     solve_lower_transposed,
 )
+from feasibility.sims_flanagan.fast.arc_kernels import clip_ends, coast_to, let_ends_grow
 from feasibility.sims_flanagan.fast.dual_kernels import least_thrust, whiten, z_of_impulses
 from feasibility.sims_flanagan.fast.element_kernels import (
     element_derivatives,
@@ -22,10 +22,12 @@ from feasibility.sims_flanagan.fast.element_kernels import (
     wrap,
 )
 from feasibility.sims_flanagan.fast.workspace_kernels import (
+    COAST,
     D_DV,
     D_MOVED,
     D_NODES,
     D_RESIDUAL,
+    FREE,
     GAP,
     JUMPS,
     LINEAR,
@@ -38,6 +40,7 @@ from feasibility.sims_flanagan.fast.workspace_kernels import (
     PREVIOUS,
     RESIDUAL,
     TOTAL,
+    WEIGHT,
     WORK,
     Workspace,
     X,
@@ -50,7 +53,14 @@ _Array = NDArray[np.float64]
 
 @inner_kernel
 def draw_path(
-    e0: _Array, e1: _Array, tof: float, turns: int, n: int, shape: _Array, nodes: _Array
+    e0: _Array,
+    e1: _Array,
+    tof: float,
+    turns: int,
+    n: int,
+    shape: _Array,
+    nodes: _Array,
+    coast: _Array,
 ) -> float:
     """Draw the elements before each impulse along a path with a number of turns.
 
@@ -59,6 +69,7 @@ def draw_path(
     at arrival, NaN where the path would need an absurd mean motion.
 
     `shape` (5, 3) adds sin(k pi t), k = 1, 2, 3 to each element but the longitude.
+    `coast` are the times before each impulse; those of free ends act at the ends.
     """
     mean_motion = 0.5 * (e0[0] + e1[0])
     travel = mean_motion * tof + wrap(e1[5] - e0[5] - mean_motion * tof) + _TWO_PI * turns
@@ -67,8 +78,10 @@ def draw_path(
     high = max(e0[0], e1[0])
     if turns != 0 and not mean_motion + 1.5 * bump > 0.2 * low:
         return np.nan
+    first = 1 if coast[0] == 0.0 else 0
+    segments = n - first - (1 if coast[n] == 0.0 else 0)
     for i in range(n):
-        t = (i + 0.5) / n
+        t = min(max((i - first + 0.5) / segments, 0.0), 1.0)
         for j in range(1, 5):
             nodes[i, j] = e0[j] + t * (e1[j] - e0[j])
         motion = e0[0] + t * (e1[0] - e0[0]) + 6.0 * bump * t * (1.0 - t)
@@ -86,23 +99,31 @@ def draw_path(
 
 @inner_kernel
 def draw_arc(
-    x0: _Array, dv: _Array, e0: _Array, e1: _Array, dt: float, n: int, nodes: _Array, x: _Array
+    x0: _Array,
+    dv: _Array,
+    e0: _Array,
+    e1: _Array,
+    coast: _Array,
+    n: int,
+    nodes: _Array,
+    x: _Array,
 ) -> float:
     """Write the elements before each impulse of an arc; return its mean longitude at arrival.
 
     NaN where the arc leaves the ellipses.
     """
-    longitude = e0[5] + 0.5 * dt * e0[0]
-    propagate(x0, 0.5 * dt, 1.0, x)
+    longitude = e0[5] + coast[0] * e0[0]
+    coast_to(x0, coast[0], x)
     for i in range(n):
         if not to_elements(x, nodes[i]):
             return np.nan
         nodes[i, 5] = longitude + wrap(nodes[i, 5] - longitude)
-        longitude = nodes[i, 5] + dt * nodes[i, 0]
+        span = coast[i + 1] if i < n - 1 else 2.0 * coast[n]
+        longitude = nodes[i, 5] + span * nodes[i, 0]
         for j in range(3):
             x[3 + j] += dv[i, j]
-        propagate(x, dt, 1.0, x)
-    longitude -= 0.5 * dt * nodes[n - 1, 0]
+        coast_to(x, span, x)
+    longitude -= coast[n] * nodes[n - 1, 0]
     return float(longitude - wrap(longitude - e1[5]))
 
 
@@ -117,7 +138,9 @@ def _linearise_nodes(nodes: _Array, dv: _Array, n: int, first: bool, w: Workspac
     one, two = w.m[M_ONE], w.m[M_TWO]
     for i in range(n):
         from_elements(nodes[i], x)
-        if not first:
+        # Paths begin without impulses, but for those of free ends.
+        bare = first and w.s[FREE, i] == 0.0
+        if not bare:
             if not element_derivatives(x, int(0), one, w.v):
                 return False
             for j in range(3):
@@ -127,7 +150,7 @@ def _linearise_nodes(nodes: _Array, dv: _Array, n: int, first: bool, w: Workspac
         for j in range(6):
             jumps[i, j] -= nodes[i, j]
         jumps[i, 5] = wrap(jumps[i, 5])
-        if first:
+        if bare:
             if not element_derivatives(x, int(3), two, w.v):
                 return False
             for j in range(6):
@@ -148,14 +171,14 @@ def _linearise_nodes(nodes: _Array, dv: _Array, n: int, first: bool, w: Workspac
 
 @inner_kernel
 def _condense(
-    e0: _Array, e1: _Array, longitude: float, dt: float, n: int, nodes: _Array, w: Workspace
+    e0: _Array, e1: _Array, longitude: float, n: int, nodes: _Array, w: Workspace
 ) -> None:
     """Write how the end moves with each impulse, w.b[0], and by how much it is missed, w.v[GAP].
 
     Also by how much the flow from the node before misses each node: w.n6[MOVED].
     """
     jumps, moved = w.n6[JUMPS], w.n6[MOVED]
-    b, response = w.b[0], w.b[1]
+    b, response, coast = w.b[0], w.b[1], w.s[COAST]
     one, two, gap = w.m[M_ONE], w.m[M_TWO], w.v[GAP]
     # Last node first: m = d(end)/d(elements after impulse i).
     for j in range(6):
@@ -163,8 +186,8 @@ def _condense(
         for k in range(6):
             one[j, k] = 1.0 if j == k else 0.0
     gap[5] = longitude - nodes[n - 1, 5] - jumps[n - 1, 5]
-    one[5, 0] = 0.5 * dt
-    gap[5] -= 0.5 * dt * (nodes[n - 1, 0] + jumps[n - 1, 0])
+    one[5, 0] = coast[n]
+    gap[5] -= coast[n] * (nodes[n - 1, 0] + jumps[n - 1, 0])
     for i in range(n - 1, -1, -1):
         for j in range(6):
             for k in range(3):
@@ -178,7 +201,7 @@ def _condense(
                 for q in range(6):
                     value += one[j, q] * w.m[i, q, k]
                 two[j, k] = value
-        span = dt if i > 0 else 0.5 * dt
+        span = coast[i]
         for j in range(6):
             before = nodes[i - 1, j] + jumps[i - 1, j] if i > 0 else e0[j]
             moved[i, j] = before - nodes[i, j]
@@ -196,7 +219,6 @@ def lifted_sweep(
     e0: _Array,
     e1: _Array,
     longitude: float,
-    dt: float,
     n: int,
     n_forward: int,
     c: float,
@@ -220,13 +242,14 @@ def lifted_sweep(
     gap, total, work = w.v[GAP], w.v[TOTAL], w.v[WORK]
     if not _linearise_nodes(nodes, dv, n, first, w):
         return -1.0, np.inf
-    _condense(e0, e1, longitude, dt, n, nodes, w)
+    _condense(e0, e1, longitude, n, nodes, w)
     for j in range(6):
         total[j] = gap[j]
         for i in range(n):
             for k in range(3):
                 total[j] += b[i, j, k] * dv[i, k]
-    if not whiten(b, n, w.m[M_ONE], w.m[LOWER]):
+    let_ends_grow(n, w)
+    if not whiten(b, n, w.m[M_ONE], w.m[LOWER], w):
         return -1.0, np.inf
     solve_lower(w.m[LOWER], total)
     if gentle:
@@ -235,7 +258,11 @@ def lifted_sweep(
                 linear[i, k] = 0.0
                 for j in range(6):
                     linear[i, k] += b[i, j, k] * total[j]
-        z = z_of_impulses(linear, n, n_forward, c)
+            if w.s[FREE, i] > 0.0:
+                for k in range(3):
+                    linear[i, k] *= w.s[WEIGHT, i]
+        clip_ends(linear, n, w)
+        z = z_of_impulses(linear, n, n_forward, c, w.s[FREE])
     else:
         multiply_lower_transposed(w.m[LOWER], lam)
         z = least_thrust(b, total, n, n_forward, c, lam, z, dv, linear, w)
@@ -258,7 +285,7 @@ def lifted_sweep(
             for k in range(3):
                 value += response[i, j, k] * (linear[i, k] - dv[i, k])
             work[j] = value
-        work[5] += work[0] * dt
+        work[5] += work[0] * w.s[COAST, i + 1]
         for k in range(3):
             residual[i, k] = linear[i, k] - dv[i, k]
             change += abs(residual[i, k])

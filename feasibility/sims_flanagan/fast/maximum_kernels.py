@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.runtime.jit import inner_kernel, kernel
-from feasibility.sims_flanagan.fast.arc_kernels import close, improve
+from feasibility.sims_flanagan.fast.arc_kernels import clip_ends, close, improve
 from feasibility.sims_flanagan.fast.dual_kernels import z_of_impulses
 from feasibility.sims_flanagan.fast.element_kernels import to_elements
 from feasibility.sims_flanagan.fast.frame_kernels import scale_leg, write_throttles
@@ -19,9 +19,11 @@ from feasibility.sims_flanagan.fast.lifted_kernels import (
 from feasibility.sims_flanagan.fast.newton_kernels import polish
 from feasibility.sims_flanagan.fast.workspace_kernels import (
     BEST,
+    COAST,
     DV,
     E0,
     E1,
+    FREE,
     LONGITUDE,
     NODES,
     START_LAM,
@@ -30,6 +32,7 @@ from feasibility.sims_flanagan.fast.workspace_kernels import (
     Workspace,
     X,
     Z,
+    lay_timeline,
     make_workspace,
 )
 
@@ -66,13 +69,13 @@ def likely_turn(k: int, best: float, w: Workspace) -> int:
     """Return the start number of the k-th, cyclically, of the turns not far from `best`."""
     likely = 0
     for s in range(_N_TURNS):
-        if w.v[TURN_Z, s] < _LIKELY * best:
+        if w.p[TURN_Z, s] < _LIKELY * best:
             likely += 1
     if likely == 0:
         return k % _N_TURNS
     k = k % likely
     for s in range(_N_TURNS):
-        if w.v[TURN_Z, s] < _LIKELY * best:
+        if w.p[TURN_Z, s] < _LIKELY * best:
             if k == 0:
                 return s
             k -= 1
@@ -84,7 +87,7 @@ def leading_turn(w: Workspace) -> int:
     """Return the start number of the waiting turn of least z."""
     s = int(0)
     for other in range(1, _N_TURNS):
-        if w.v[Z, other] < w.v[Z, s]:
+        if w.p[Z, other] < w.p[Z, s]:
             s = other
     return s
 
@@ -94,50 +97,58 @@ def longest_travel(w: Workspace) -> float:
     """Return the largest change of mean longitude among the likely numbers of turns."""
     least = np.inf
     for s in range(_N_TURNS):
-        least = min(least, w.v[TURN_Z, s])
+        least = min(least, w.p[TURN_Z, s])
     longest = 0.0
     for s in range(_N_TURNS):
-        if w.v[TURN_Z, s] < _RIVAL * least:
-            longest = max(longest, w.v[LONGITUDE, s] - w.v[E0, 5])
+        if w.p[TURN_Z, s] < _RIVAL * least:
+            longest = max(longest, w.p[LONGITUDE, s] - w.v[E0, 5])
     return longest
 
 
 @inner_kernel
 def lay_path(s: int, turns: int, shape: _Array, tof: float, n: int, w: Workspace) -> bool:
     """Draw path `s`, without impulses yet; return whether there is one."""
-    w.v[Z, s] = np.inf
-    w.v[LONGITUDE, s] = draw_path(w.v[E0], w.v[E1], tof, turns, n, shape, w.n6[NODES + s])
+    w.p[Z, s] = np.inf
+    w.p[LONGITUDE, s] = draw_path(
+        w.v[E0], w.v[E1], tof, turns, n, shape, w.n6[NODES + s], w.s[COAST]
+    )
     for i in range(6):
         w.v[START_LAM + s, i] = 0.0
     for i in range(n):
         for j in range(3):
             w.n3[STARTS + s, i, j] = 0.0
-    return not math.isnan(w.v[LONGITUDE, s])
+    return not math.isnan(w.p[LONGITUDE, s])
 
 
 @inner_kernel
 def bend(
-    s: int, sweeps: int, gentle: int, tof: float, c: float, n: int, best: float, w: Workspace
+    s: int,
+    sweeps: int,
+    gentle: int,
+    c: float,
+    n: int,
+    n_forward: int,
+    best: float,
+    w: Workspace,
 ) -> bool:
     """Take up to `sweeps` lifted steps on path `s`; return False where it lags behind `best`.
 
     A path without impulses takes plain steps, the first `gentle` of them to the least sum
     of squares instead of the least thrust, which often leads to another optimum; its z goes
-    to w.v[Z, s]. A path under way follows Anderson's rule until it stands still.
+    to w.p[Z, s]. A path under way follows Anderson's rule until it stands still.
     """
     nodes, start, lam = w.n6[NODES + s], w.n3[STARTS + s], w.v[START_LAM + s]
-    fresh = not w.v[Z, s] < np.inf
-    z = -1.0 if fresh else w.v[Z, s]
+    fresh = not w.p[Z, s] < np.inf
+    z = -1.0 if fresh else w.p[Z, s]
     relax = 1.0 if fresh else _RELAX
     count = int(0)
     for sweep in range(sweeps):
         z, move = lifted_sweep(
             w.v[E0],
             w.v[E1],
-            w.v[LONGITUDE, s],
-            tof / n,
+            w.p[LONGITUDE, s],
             n,
-            n // 2,
+            n_forward,
             c,
             fresh and sweep == 0,
             fresh and sweep < gentle,
@@ -160,21 +171,19 @@ def bend(
         if count < 0:
             break
         if fresh:
-            w.v[Z, s] = z
+            w.p[Z, s] = z
     return True
 
 
 @inner_kernel
-def lay_hop(
-    s: int, x0: _Array, wave: _Array, tof: float, n: int, best: float, w: Workspace
-) -> bool:
+def lay_hop(s: int, x0: _Array, wave: _Array, n: int, best: float, w: Workspace) -> bool:
     """Lay path `s` along the arc in w.n3[BEST], its impulses turned by waves; return whether."""
-    w.v[LONGITUDE, s] = draw_arc(
-        x0, w.n3[BEST], w.v[E0], w.v[E1], tof / n, n, w.n6[NODES + s], w.v[X]
+    w.p[LONGITUDE, s] = draw_arc(
+        x0, w.n3[BEST], w.v[E0], w.v[E1], w.s[COAST], n, w.n6[NODES + s], w.v[X]
     )
-    if math.isnan(w.v[LONGITUDE, s]):
+    if math.isnan(w.p[LONGITUDE, s]):
         return False
-    w.v[Z, s] = best
+    w.p[Z, s] = best
     for i in range(n):
         t = (i + 0.5) / n
         size = 0.0
@@ -182,6 +191,10 @@ def lay_hop(
         for j in range(3):
             size += w.n3[BEST, i, j] ** 2
         size = math.sqrt(size)
+        if w.s[FREE, i] > 0.0:
+            for j in range(3):
+                w.n3[STARTS + s, i, j] = w.n3[BEST, i, j]
+            continue
         for j in range(3):
             turned = w.n3[BEST, i, j] / size
             for k in range(3):
@@ -197,7 +210,14 @@ def lay_hop(
 
 @inner_kernel
 def pursue(
-    s: int, x0: _Array, tof: float, c: float, n: int, best: float, thorough: bool, w: Workspace
+    s: int,
+    x0: _Array,
+    c: float,
+    n: int,
+    n_forward: int,
+    best: float,
+    thorough: bool,
+    w: Workspace,
 ) -> float:
     """Make path `s` an arc and improve it; leave it in w.n3[DV], return its z or inf.
 
@@ -205,18 +225,18 @@ def pursue(
     nor far behind it.
     """
     dv, target = w.n3[DV], w.v[E1]
-    dt = tof / n
     z = np.inf
-    if w.v[Z, s] < np.inf and bend(s, int(_SWEEPS), int(0), tof, c, n, best, w):
+    if w.p[Z, s] < np.inf and bend(s, int(_SWEEPS), int(0), c, n, n_forward, best, w):
         for i in range(n):
             for j in range(3):
                 dv[i, j] = w.n3[STARTS + s, i, j]
-        if close(x0, dv, n, dt, target, 1e-9, int(12), w):
+        clip_ends(dv, n, w)
+        if close(x0, dv, n, target, 1e-9, int(12), w):
             lam = w.v[START_LAM + s]
-            z = improve(x0, dv, n, n // 2, dt, c, target, 30, 1e-4, _HOPELESS * best, lam, w)
+            z = improve(x0, dv, n, n_forward, c, target, 30, 1e-4, _HOPELESS * best, lam, w)
             if thorough and z < _HOPELESS * best and abs(z - best) > _SAME * best:
-                z = polish(x0, dv, n, n // 2, dt, c, target, w)
-    w.v[Z, s] = np.inf
+                z = polish(x0, dv, n, n_forward, c, target, w)
+    w.p[Z, s] = np.inf
     return z
 
 
@@ -239,8 +259,8 @@ def _best_arc(
     agreed = 0
     for s in range(_N_TURNS):
         if lay_path(s, turns_of(s), straight, tof, n, w):
-            bend(s, int(_FIRST_SWEEPS), no_sweeps, tof, c, n, best, w)
-        w.v[TURN_Z, s] = w.v[Z, s]
+            bend(s, int(_FIRST_SWEEPS), no_sweeps, c, n, n // 2, best, w)
+        w.p[TURN_Z, s] = w.p[Z, s]
     travel = longest_travel(w)
     # On short legs all starts agree.
     long = travel > _SHORT
@@ -257,12 +277,12 @@ def _best_arc(
         if k < 0:
             s = leading_turn(w)
             start = s
-            if not w.v[Z, s] < _SCREEN * best:
+            if not w.p[Z, s] < _SCREEN * best:
                 continue
         elif 0 <= hop < n_hops:
             s = last
             start = _N_TURNS + bent.shape[0] + 1
-            if not (best < np.inf and lay_hop(s, x0, bent[1 + hop], tof, n, best, w)):
+            if not (best < np.inf and lay_hop(s, x0, bent[1 + hop], n, best, w)):
                 continue
         else:
             s = last
@@ -270,10 +290,10 @@ def _best_arc(
                 start = _N_TURNS + bent.shape[0]
             shape = bent[k] if hop < 0 else shapes[hop - n_hops]
             if lay_path(s, turns_of(likely_turn(k, best, w)), shape, tof, n, w):
-                bend(s, first_and_gentle, int(_GENTLE), tof, c, n, best, w)
-        z = pursue(s, x0, tof, c, n, best, long, w)
+                bend(s, first_and_gentle, int(_GENTLE), c, n, n // 2, best, w)
+        z = pursue(s, x0, c, n, n // 2, best, long, w)
         if k < 0 and z < np.inf:
-            w.v[TURN_Z, s] = z
+            w.p[TURN_Z, s] = z
         if z < best:
             agreed = agreed + 1 if z > (1.0 - _SAME) * best else 1
         elif z < (1.0 + _SAME) * best and not 0 <= hop < n_hops:
@@ -339,11 +359,12 @@ def maximum_batch(
         c = exhaust[row] / speed
         if not to_elements(x0, w.v[E0]) or not to_elements(x1, w.v[E1]):
             continue
+        lay_timeline(tof, n, 0.0, 0.0, 1.0, w)
         best, start, unsure = _best_arc(x0, tof, c, n, bent, shapes[row], w)
         if best < np.inf:
             winner[row] = start
             if unsure:
-                polish(x0, w.n3[BEST], n, n // 2, tof / n, c, w.v[E1], w)
-            close(x0, w.n3[BEST], n, tof / n, w.v[E1], 1e-12, int(4), w)
-            z_out[row] = z_of_impulses(w.n3[BEST], n, n // 2, c)
+                polish(x0, w.n3[BEST], n, n // 2, c, w.v[E1], w)
+            close(x0, w.n3[BEST], n, w.v[E1], 1e-12, int(4), w)
+            z_out[row] = z_of_impulses(w.n3[BEST], n, n // 2, c, w.s[FREE])
             mass_ratio[row] = write_throttles(w.n3[BEST], z_out[row], c, n, frame, throttles[row])

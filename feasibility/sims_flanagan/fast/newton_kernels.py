@@ -11,27 +11,37 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.orbits.kepler_kernels import propagate, propagate_stm
 from feasibility.runtime.jit import inner_kernel, kernel
 from feasibility.sims_flanagan.fast.algebra_kernels import (
     cholesky,
     solve_lower,
     solve_lower_transposed,
 )
-from feasibility.sims_flanagan.fast.arc_kernels import linearise, whitened_gap
+from feasibility.sims_flanagan.fast.arc_kernels import (
+    coast_to,
+    coast_to_stm,
+    linearise,
+    whitened_gap,
+)
 from feasibility.sims_flanagan.fast.dual_kernels import full_thrust_profile, z_of_impulses
 from feasibility.sims_flanagan.fast.element_kernels import element_derivatives
 from feasibility.sims_flanagan.fast.workspace_kernels import (
+    CAP,
+    COAST,
     D_MOVED,
     D_RESIDUAL,
+    FREE,
     GAP,
     HESSIAN,
     HESSIAN_LOWER,
     LAM,
     LOWER,
     M_ONE,
+    NORM,
+    PINNED,
     SLOPE,
     STEP,
+    THRESHOLD,
     TOTAL,
     TRIAL_GAP,
     TRIAL_LAM,
@@ -53,6 +63,11 @@ _LARGEST_TURN = 1.5
 _LARGEST_RISE = 1.03
 # Rows of Workspace.n3 that belong to Anderson's rule, which is at rest here.
 _U, _FIRST, _SECOND, _PRIMER, _TRIAL_U, _ARC = range(D_RESIDUAL, D_RESIDUAL + 6)
+# Rows of Workspace.s that are free here: lengths of the excess velocities at free ends, now and
+# before the step, whether they may change, and the unit of each impulse's steps.
+_EXCESS, _EXCESS_BEFORE, _LOOSE, _STEP = THRESHOLD, CAP, PINNED, NORM
+_SHORTEST = 1e-6
+_AT_BOUND = 0.999
 
 _Array = NDArray[np.float64]
 
@@ -140,61 +155,104 @@ def _tangents(u: _Array, first: _Array, second: _Array) -> None:
 def _thrust(
     u: _Array, z: float, n: int, n_forward: int, c: float, arc: _Array, w: Workspace
 ) -> None:
-    """Write the impulses of full thrust along the unit vectors `u`."""
-    full_thrust_profile(z, n, n_forward, w.s[Y], w.s[SLOPE])
+    """Write the impulses of full thrust along the unit vectors `u`, and the excess of ends."""
+    full_thrust_profile(z, n, n_forward, c, w.s[_EXCESS], w.s[Y], w.s[SLOPE])
     for i in range(n):
         for j in range(3):
             arc[i, j] = c * w.s[Y, i] * u[i, j]
 
 
 @inner_kernel
-def _turn(table: _Array, nu: _Array, n: int, u: _Array, trial: _Array, w: Workspace) -> float:
+def _turn(
+    table: _Array, size: int, nu: _Array, n: int, u: _Array, trial: _Array, w: Workspace
+) -> float:
     """Write the directions `u` turned by the step of the multipliers `nu`; return the largest."""
     largest = 0.0
+    unknown = 2 * n
     for i in range(n):
         t0 = t1 = 0.0
         for q in range(6):
-            t0 -= table[2 * n + 2 * i, 2 * n + q] * nu[q]
-            t1 -= table[2 * n + 2 * i + 1, 2 * n + q] * nu[q]
-        size = 0.0
+            t0 -= table[size + 2 * i, size + q] * nu[q]
+            t1 -= table[size + 2 * i + 1, size + q] * nu[q]
+        excess = w.s[_EXCESS, i]
+        if excess > 0.0:
+            t2 = 0.0
+            if w.s[_LOOSE, i] > 0.0:
+                for q in range(6):
+                    t2 -= table[size + unknown, size + q] * nu[q]
+                unknown += 1
+            _turn_end(i, w.s[_STEP, i], t0, t1, t2, u[i], trial[i], w)
+            largest = max(largest, w.s[_STEP, i] / excess * max(abs(t0), abs(t1), abs(t2)))
+            continue
+        length = 0.0
         for j in range(3):
             trial[i, j] = u[i, j] + t0 * w.n3[_FIRST, i, j] + t1 * w.n3[_SECOND, i, j]
-            size += trial[i, j] * trial[i, j]
-        size = math.sqrt(size)
+            length += trial[i, j] * trial[i, j]
+        length = math.sqrt(length)
         for j in range(3):
-            trial[i, j] /= size
+            trial[i, j] /= length
         largest = max(largest, abs(t0), abs(t1))
     return largest
 
 
 @inner_kernel
+def _turn_end(
+    i: int,
+    step: float,
+    t0: float,
+    t1: float,
+    t2: float,
+    u: _Array,
+    trial: _Array,
+    w: Workspace,
+) -> None:
+    """Write the excess velocity of a free end after a step: its direction and its length."""
+    excess = w.s[_EXCESS, i]
+    length = 0.0
+    for j in range(3):
+        trial[j] = (excess + step * t2) * u[j] + step * (
+            t0 * w.n3[_FIRST, i, j] + t1 * w.n3[_SECOND, i, j]
+        )
+        length += trial[j] * trial[j]
+    length = math.sqrt(length)
+    for j in range(3):
+        trial[j] /= length
+    if w.s[_LOOSE, i] > 0.0:
+        w.s[_EXCESS, i] = min(length, w.s[FREE, i])
+
+
+@inner_kernel
 def _curvature(
-    x0: _Array, n: int, dt: float, c: float, lam: _Array, table: _Array, w: Workspace
+    x0: _Array, n: int, c: float, lam: _Array, table: _Array, size: int, w: Workspace
 ) -> bool:
     """Write the Hessian of the Lagrangian in the tangent steps; return False where it cannot.
 
     By differences of the primers: a disturbed impulse changes the arc after it only.
     """
-    arc, primer, y = w.n3[_ARC], w.n3[_PRIMER], w.s[Y]
+    arc, primer, step, coast = w.n3[_ARC], w.n3[_PRIMER], w.s[_STEP], w.s[COAST]
     states, x, psi, jacobian = w.n6[D_MOVED], w.v[X], w.v[WORK], w.m[M_ONE]
-    propagate(x0, 0.5 * dt, 1.0, x)
+    coast_to(x0, coast[0], x)
     for i in range(n):
         for j in range(6):
             states[i, j] = x[j]
         for j in range(3):
             x[3 + j] += arc[i, j]
-        propagate(x, dt, 1.0, x)
-    for row in range(2 * n):
+        coast_to(x, coast[i + 1], x)
+    for row in range(size):
         i = row // 2
         across = w.n3[_FIRST if row % 2 == 0 else _SECOND, i]
+        if row >= 2 * n:
+            # A loose end may be longer too; only the last of them can be the arrival.
+            i = int(0) if row == 2 * n and w.s[_LOOSE, 0] > 0.0 else n - 1
+            across = w.n3[_U, i]
         for j in range(6):
             x[j] = states[i, j]
         for j in range(3):
-            x[3 + j] += c * y[i] * _DIFFERENCE * across[j]
+            x[3 + j] += step[i] * _DIFFERENCE * across[j]
         for k in range(i, n):
             for j in range(3):
                 x[3 + j] += arc[k, j]
-            propagate_stm(x, dt if k < n - 1 else 0.5 * dt, 1.0, x, w.m[k])
+            coast_to_stm(x, coast[k + 1], x, w.m[k])
         if not element_derivatives(x, int(0), jacobian, w.v):
             return False
         for j in range(6):
@@ -208,20 +266,32 @@ def _curvature(
                 psi[j] = 0.0
                 for q in range(6):
                     psi[j] += w.m[k, q, j] * x[q]
-            scale = c * y[k] / _DIFFERENCE
+            scale = step[k] / _DIFFERENCE
             d0 = scale * (psi[3] - primer[k, 0])
             d1 = scale * (psi[4] - primer[k, 1])
             d2 = scale * (psi[5] - primer[k, 2])
-            table[2 * k, row] = (
-                d0 * w.n3[_FIRST, k, 0] + d1 * w.n3[_FIRST, k, 1] + d2 * w.n3[_FIRST, k, 2]
-            )
-            table[2 * k + 1, row] = (
+            first = d0 * w.n3[_FIRST, k, 0] + d1 * w.n3[_FIRST, k, 1] + d2 * w.n3[_FIRST, k, 2]
+            second = (
                 d0 * w.n3[_SECOND, k, 0] + d1 * w.n3[_SECOND, k, 1] + d2 * w.n3[_SECOND, k, 2]
             )
-        along = 0.0
-        for j in range(3):
-            along += primer[i, j] * w.n3[_U, i, j]
-        table[row, row] -= c * y[i] * along
+            if row < 2 * n:
+                table[2 * k, row] = first
+                table[2 * k + 1, row] = second
+            else:
+                table[row, 2 * k] = first
+                table[row, 2 * k + 1] = second
+            if w.s[_LOOSE, k] > 0.0:
+                loose = size - 1 if k == n - 1 else 2 * n
+                table[loose, row] = (
+                    d0 * w.n3[_U, k, 0] + d1 * w.n3[_U, k, 1] + d2 * w.n3[_U, k, 2]
+                )
+        if row < 2 * n:
+            along = 0.0
+            for j in range(3):
+                along += primer[i, j] * w.n3[_U, i, j]
+            if w.s[_EXCESS, i] > 0.0:
+                along *= step[i] / w.s[_EXCESS, i]
+            table[row, row] -= step[i] * along
     return True
 
 
@@ -237,14 +307,24 @@ def _directions(dv: _Array, n: int, u: _Array) -> None:
 
 
 @inner_kernel
-def _responses(n: int, c: float, pull: _Array, table: _Array, w: Workspace) -> None:
+def _responses(
+    n: int, c: float, pull: _Array, table: _Array, size: int, w: Workspace
+) -> None:
     """Write how the end moves with z, `pull`, and with turns, right of the Hessian in `table`."""
     u, y, slope, b = w.n3[_U], w.s[Y], w.s[SLOPE], w.b[0]
-    size = 2 * n
+    mean = 0.0
+    for i in range(n):
+        if w.s[_EXCESS, i] == 0.0:
+            mean += c * y[i] / n
+    unknown = 2 * n
     for q in range(6):
         pull[q] = 0.0
     for i in range(n):
         _tangents(u[i], w.n3[_FIRST, i], w.n3[_SECOND, i])
+        # Free ends move in steps like the segments'.
+        step = c * y[i] if w.s[_EXCESS, i] == 0.0 else mean
+        w.s[_STEP, i] = step
+        loose = w.s[_LOOSE, i] > 0.0
         for q in range(6):
             t0 = t1 = along = 0.0
             for j in range(3):
@@ -252,12 +332,18 @@ def _responses(n: int, c: float, pull: _Array, table: _Array, w: Workspace) -> N
                 t0 += b[i, q, j] * w.n3[_FIRST, i, j]
                 t1 += b[i, q, j] * w.n3[_SECOND, i, j]
             pull[q] += c * slope[i] * along
-            table[2 * i, size + q] = c * y[i] * t0
-            table[2 * i + 1, size + q] = c * y[i] * t1
+            table[2 * i, size + q] = step * t0
+            table[2 * i + 1, size + q] = step * t1
+            if loose:
+                table[unknown, size + q] = step * along
+        if loose:
+            unknown += 1
 
 
 @inner_kernel
-def _multipliers(n: int, c: float, pull: _Array, table: _Array, w: Workspace) -> float:
+def _multipliers(
+    n: int, c: float, pull: _Array, table: _Array, size: int, w: Workspace
+) -> float:
     """Write the multipliers, w.v[LAM], and primers by least squares across the thrust.
 
     The multipliers before whitening go to w.v[TRIAL_LAM]. Returns the mean of the primers,
@@ -267,7 +353,7 @@ def _multipliers(n: int, c: float, pull: _Array, table: _Array, w: Workspace) ->
     gram, lower = w.m[HESSIAN], w.m[HESSIAN_LOWER]
     for q in range(6):
         lam[q] = pull[q]
-    if not _stiffness(table, 2 * n, int(0), pull, gram, lower) > 0.0:
+    if not _stiffness(table, size, int(0), pull, gram, lower) > 0.0:
         return 0.0
     solve_lower(lower, lam)
     solve_lower_transposed(lower, lam)
@@ -287,7 +373,8 @@ def _multipliers(n: int, c: float, pull: _Array, table: _Array, w: Workspace) ->
                 total += b[i, q, j] * lam[q]
             primer[i, j] = total
             long += total * total
-        mean += c * w.s[Y, i] * math.sqrt(long) / n
+        if w.s[_EXCESS, i] == 0.0:
+            mean += c * w.s[Y, i] * math.sqrt(long) / n
     return mean
 
 
@@ -335,13 +422,13 @@ def _close_again(
     x0: _Array,
     n: int,
     n_forward: int,
-    dt: float,
     c: float,
     target: _Array,
     z: float,
     ease: float,
     pull: _Array,
     table: _Array,
+    size: int,
     w: Workspace,
 ) -> float:
     """Close the arc of the turned directions by steps of the same metric; return its z or inf."""
@@ -349,7 +436,7 @@ def _close_again(
     before = np.inf
     for _ in range(_CORRECTIONS):
         _thrust(trial, z, n, n_forward, c, arc, w)
-        miss = whitened_gap(x0, arc, n, dt, target, w, gap)
+        miss = whitened_gap(x0, arc, n, target, w, gap)
         if miss < _CLOSED:
             return z
         if not miss < 0.5 * before:
@@ -357,10 +444,40 @@ def _close_again(
         before = miss
         solve_lower(lower, gap)
         solve_lower_transposed(lower, gap)
-        _turn(table, gap, n, trial, trial, w)
+        _turn(table, size, gap, n, trial, trial, w)
         for q in range(6):
             z -= ease * pull[q] * gap[q]
     return np.inf
+
+
+@inner_kernel
+def _look_at_ends(dv: _Array, n: int, w: Workspace) -> int:
+    """Write the lengths of the excess velocities, and which are loose; return how many are."""
+    count = 0
+    for i in range(n):
+        w.s[_EXCESS, i] = 0.0
+        w.s[_LOOSE, i] = 0.0
+        if w.s[FREE, i] > 0.0:
+            size = math.sqrt(dv[i, 0] ** 2 + dv[i, 1] ** 2 + dv[i, 2] ** 2)
+            w.s[_EXCESS, i] = max(size, _SHORTEST * w.s[FREE, i])
+            if size < _AT_BOUND * w.s[FREE, i]:
+                w.s[_LOOSE, i] = 1.0
+                count += 1
+    return count
+
+
+@inner_kernel
+def _keep_excess(n: int, w: Workspace) -> None:
+    """Remember the lengths of the excess velocities before a step."""
+    for i in range(0, n, max(n - 1, 1)):
+        w.s[_EXCESS_BEFORE, i] = w.s[_EXCESS, i]
+
+
+@inner_kernel
+def _recall_excess(n: int, w: Workspace) -> None:
+    """Take back what a step made of the excess velocities."""
+    for i in range(0, n, max(n - 1, 1)):
+        w.s[_EXCESS, i] = w.s[_EXCESS_BEFORE, i]
 
 
 @inner_kernel
@@ -369,7 +486,6 @@ def polish(
     dv: _Array,
     n: int,
     n_forward: int,
-    dt: float,
     c: float,
     target: _Array,
     w: Workspace,
@@ -378,25 +494,26 @@ def polish(
 
     Least z with the arc closed, in the tangent steps t_i of the directions and in z. The
     Hessian of the Lagrangian is damped (Levenberg 1944) until it is positive definite and
-    the step, closed again by its own metric, lowers z.
+    the step, closed again by its own metric, lowers z. The excess of a free end turns as well;
+    where it is shorter than its bound, it is loose: its length is one more unknown.
     """
-    size = 2 * n
+    size = 2 * n + _look_at_ends(dv, n, w)
     table = np.empty((2 * size, size + 6))
     u, trial, arc = w.n3[_U], w.n3[_TRIAL_U], w.n3[_ARC]
     gap, lam, pull, rise = w.v[GAP], w.v[LAM], w.v[TOTAL], w.v[STEP]
     gram, lower = w.m[HESSIAN], w.m[HESSIAN_LOWER]
-    z = z_of_impulses(dv, n, n_forward, c)
+    z = z_of_impulses(dv, n, n_forward, c, w.s[FREE])
     _directions(dv, n, u)
     bound = _LARGEST_RISE * z
     best = z
     damping = 0.0
     for _ in range(_ITERATIONS):
         _thrust(u, z, n, n_forward, c, arc, w)
-        if not linearise(x0, arc, n, dt, target, w, gap) < np.inf:
+        if not linearise(x0, arc, n, target, w, gap) < np.inf:
             break
-        _responses(n, c, pull, table, w)
-        mean = _multipliers(n, c, pull, table, w)
-        if not mean > 0.0 or not _curvature(x0, n, dt, c, w.v[TRIAL_LAM], table, w):
+        _responses(n, c, pull, table, size, w)
+        mean = _multipliers(n, c, pull, table, size, w)
+        if not mean > 0.0 or not _curvature(x0, n, c, w.v[TRIAL_LAM], table, size, w):
             break
         _stiffen(table, size, mean)
         new_z = np.inf
@@ -407,12 +524,17 @@ def polish(
                 if not ease > 0.0:
                     break
                 dz = _newton_step(ease, pull, gap, rise, lam, lower)
-                if abs(dz) < 0.3 * z and _turn(table, lam, n, u, trial, w) < _LARGEST_TURN:
+                _keep_excess(n, w)
+                if (
+                    abs(dz) < 0.3 * z
+                    and _turn(table, size, lam, n, u, trial, w) < _LARGEST_TURN
+                ):
                     new_z = _close_again(
-                        x0, n, n_forward, dt, c, target, z + dz, ease, pull, table, w
+                        x0, n, n_forward, c, target, z + dz, ease, pull, table, size, w
                     )
                     if new_z < bound:
                         break
+                _recall_excess(n, w)
             damping = max(2.5 * damping, _FIRST_DAMPING)
         if not new_z < bound:
             break

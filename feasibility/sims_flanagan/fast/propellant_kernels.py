@@ -25,6 +25,7 @@ from feasibility.sims_flanagan.fast.workspace_kernels import (
     CAP,
     DV,
     E1,
+    FREE,
     GAP,
     HESSIAN,
     HESSIAN_LOWER,
@@ -41,8 +42,10 @@ from feasibility.sims_flanagan.fast.workspace_kernels import (
     TRIAL,
     TRIAL_GAP,
     TRIAL_LAM,
+    WEIGHT,
     WORK,
     Workspace,
+    lay_timeline,
     make_workspace,
 )
 
@@ -53,6 +56,8 @@ _SHARPEST = 0.003
 # Share of the needed thrust that softened switching may give to segments that should coast.
 _LEAK = 0.3
 _FLOOR = 1e-3
+# Softness of the excess at free ends, in units of that of switching.
+_ROUND = 0.1
 _REJECTIONS = 4
 _ATTEMPTS = 4
 _MISSING = 1e-2
@@ -63,15 +68,24 @@ _Array = NDArray[np.float64]
 
 
 @inner_kernel
-def clip_to_thrust(dv: _Array, n: int, n_forward: int, c: float, z: float, cap: _Array) -> float:
+def clip_to_thrust(
+    dv: _Array, n: int, n_forward: int, c: float, z: float, free: _Array, cap: _Array
+) -> float:
     """Shorten impulses to full thrust, masses followed from z = T dt / (m0 c); write the bounds.
 
-    Returns the sum of the impulses, which is what the propellant grows with.
+    Excess velocities of free ends are shortened to theirs. Returns the sum of the impulses, which
+    is what the propellant grows with.
     """
     total = 0.0
     for i in range(n):
-        cap[i] = c * (z if i < n_forward else backward_impulse(z))
         size = math.sqrt(dv[i, 0] ** 2 + dv[i, 1] ** 2 + dv[i, 2] ** 2)
+        if free[i] > 0.0:
+            cap[i] = free[i]
+            if size > cap[i]:
+                for j in range(3):
+                    dv[i, j] *= cap[i] / size
+            continue
+        cap[i] = c * (z if i < n_forward else backward_impulse(z))
         if size > cap[i]:
             for j in range(3):
                 dv[i, j] *= cap[i] / size
@@ -87,7 +101,6 @@ def restore_bounded(
     dv: _Array,
     n: int,
     n_forward: int,
-    dt: float,
     c: float,
     z: float,
     target: _Array,
@@ -99,11 +112,19 @@ def restore_bounded(
     sensitivities at hand are used first, those of the arc itself where they fail.
     """
     for attempt in range(_ATTEMPTS):
-        if attempt > 0 and not linearise(x0, dv, n, dt, target, w, w.v[TRIAL_GAP]) < np.inf:
+        if attempt > 0 and not linearise(x0, dv, n, target, w, w.v[TRIAL_GAP]) < np.inf:
             return False
-        if _correct_bounded(x0, dv, n, n_forward, dt, c, z, target, w):
+        if _correct_bounded(x0, dv, n, n_forward, c, z, target, w):
             return True
     return False
+
+
+@inner_kernel
+def _ease(k: int, share: float, w: Workspace) -> float:
+    """Return the weight of an impulse in corrections: its share of full thrust, nearly."""
+    if w.s[FREE, k] > 0.0:
+        return w.s[WEIGHT, k]
+    return share + _FLOOR
 
 
 @inner_kernel
@@ -112,7 +133,6 @@ def _correct_bounded(
     dv: _Array,
     n: int,
     n_forward: int,
-    dt: float,
     c: float,
     z: float,
     target: _Array,
@@ -122,8 +142,8 @@ def _correct_bounded(
     b, gap, cap = w.b[0], w.v[TRIAL_GAP], w.s[CAP]
     gram, lower = w.m[M_ONE], w.m[M_TWO]
     along = w.v[WORK]
-    clip_to_thrust(dv, n, n_forward, c, z, cap)
-    size = whitened_gap(x0, dv, n, dt, target, w, gap)
+    clip_to_thrust(dv, n, n_forward, c, z, w.s[FREE], cap)
+    size = whitened_gap(x0, dv, n, target, w, gap)
     if size < _CLOSED:
         return True
     for i in range(6):
@@ -131,7 +151,7 @@ def _correct_bounded(
             gram[i, j] = 0.0
     for k in range(n):
         thrust = math.sqrt(dv[k, 0] ** 2 + dv[k, 1] ** 2 + dv[k, 2] ** 2)
-        weight = thrust / cap[k] + _FLOOR
+        weight = _ease(k, thrust / cap[k], w)
         bound = weight / (thrust * thrust) if thrust > 0.999 * cap[k] else 0.0
         for i in range(6):
             along[i] = b[k, i, 0] * dv[k, 0] + b[k, i, 1] * dv[k, 1] + b[k, i, 2] * dv[k, 2]
@@ -150,7 +170,7 @@ def _correct_bounded(
         solve_lower_transposed(lower, gap)
         for k in range(n):
             thrust = math.sqrt(dv[k, 0] ** 2 + dv[k, 1] ** 2 + dv[k, 2] ** 2)
-            weight = thrust / cap[k] + _FLOOR
+            weight = _ease(k, thrust / cap[k], w)
             d0 = d1 = d2 = 0.0
             for i in range(6):
                 d0 += b[k, i, 0] * gap[i]
@@ -162,8 +182,8 @@ def _correct_bounded(
             dv[k, 0] -= weight * (d0 - radial * dv[k, 0])
             dv[k, 1] -= weight * (d1 - radial * dv[k, 1])
             dv[k, 2] -= weight * (d2 - radial * dv[k, 2])
-        clip_to_thrust(dv, n, n_forward, c, z, cap)
-        new_size = whitened_gap(x0, dv, n, dt, target, w, gap)
+        clip_to_thrust(dv, n, n_forward, c, z, w.s[FREE], cap)
+        new_size = whitened_gap(x0, dv, n, target, w, gap)
         if new_size < _CLOSED:
             return True
         if not new_size < 0.5 * size:
@@ -183,13 +203,15 @@ def _dual_value(
     sharpness: float,
     primer: _Array,
     norm: _Array,
+    w: Workspace,
 ) -> float:
     """Write the primers; return lam . total - sum of the softened dual terms."""
     value = 0.0
     for i in range(6):
         value += lam[i] * total[i]
     for i in range(n):
-        size = 1e-12
+        free = w.s[FREE, i] > 0.0
+        size = (_ROUND * sharpness) ** 2 / w.s[WEIGHT, i] if free else 1e-12
         for j in range(3):
             p = 0.0
             for k in range(6):
@@ -197,6 +219,9 @@ def _dual_value(
             primer[i, j] = p
             size += p * p
         norm[i] = math.sqrt(size)
+        if free:
+            value -= cap[i] * norm[i]
+            continue
         u = (norm[i] - threshold[i]) / sharpness
         value -= cap[i] * sharpness * (max(u, 0.0) + math.log1p(math.exp(-abs(u))))
     return value
@@ -216,7 +241,7 @@ def least_propellant(
     primer, norm, cap, threshold = w.n3[PRIMER], w.s[NORM], w.s[CAP], w.s[THRESHOLD]
     h, lower, step, trial = w.m[HESSIAN], w.m[HESSIAN_LOWER], w.v[STEP], w.v[TRIAL_LAM]
     along = w.v[WORK]
-    value = _dual_value(b, total, lam, n, cap, threshold, sharpness, primer, norm)
+    value = _dual_value(b, total, lam, n, cap, threshold, sharpness, primer, norm, w)
     for _ in range(_NEWTON):
         for i in range(6):
             step[i] = total[i]
@@ -228,6 +253,9 @@ def least_propellant(
             share = 1.0 / (1.0 + math.exp(-min(max(u, -500.0), 500.0)))
             thrust = cap[k] * share
             stiff = thrust * (1.0 - share) / sharpness
+            if w.s[FREE, k] > 0.0:
+                thrust = cap[k]
+                stiff = 0.0
             turn = thrust / norm[k]
             for i in range(6):
                 along[i] = (
@@ -266,7 +294,9 @@ def least_propellant(
         for _ in range(15):
             for i in range(6):
                 trial[i] = lam[i] + fraction * step[i]
-            new_value = _dual_value(b, total, trial, n, cap, threshold, sharpness, primer, norm)
+            new_value = _dual_value(
+                b, total, trial, n, cap, threshold, sharpness, primer, norm, w
+            )
             if new_value > value + 1e-4 * fraction * decrement:
                 better = True
                 break
@@ -276,10 +306,12 @@ def least_propellant(
         value = new_value
         for i in range(6):
             lam[i] = trial[i]
-    _dual_value(b, total, lam, n, cap, threshold, sharpness, primer, norm)
+    _dual_value(b, total, lam, n, cap, threshold, sharpness, primer, norm, w)
     for k in range(n):
         u = (norm[k] - threshold[k]) / sharpness
         scale = cap[k] / (1.0 + math.exp(-min(max(u, -500.0), 500.0))) / norm[k]
+        if w.s[FREE, k] > 0.0:
+            scale = cap[k] / norm[k]
         for j in range(3):
             linear[k, j] = scale * primer[k, j]
     missing = 0.0
@@ -294,7 +326,13 @@ def least_propellant(
 
 @inner_kernel
 def set_thresholds(
-    linear: _Array, n: int, n_forward: int, c: float, norm: _Array, threshold: _Array
+    linear: _Array,
+    n: int,
+    n_forward: int,
+    c: float,
+    norm: _Array,
+    free: _Array,
+    threshold: _Array,
 ) -> None:
     """Write the primer size at which each segment's thrust pays.
 
@@ -303,6 +341,8 @@ def set_thresholds(
     """
     gained = 0.0
     for i in range(n - 1, -1, -1):
+        if free[i] > 0.0:
+            continue
         y = math.sqrt(linear[i, 0] ** 2 + linear[i, 1] ** 2 + linear[i, 2] ** 2) / c
         excess = max(norm[i] - threshold[i], 0.0)
         threshold[i] = 0.5 * (threshold[i] + max(1.0 - gained, 0.05))
@@ -313,7 +353,7 @@ def set_thresholds(
 
 
 @inner_kernel
-def softest_switching(total: float, n: int, cap: _Array) -> float:
+def softest_switching(total: float, n: int, free: _Array, cap: _Array) -> float:
     """Return the width of the softened switching to begin with.
 
     A coasting segment, whose primer is zero, still gets exp(-1 / width) of full thrust. On legs
@@ -321,7 +361,8 @@ def softest_switching(total: float, n: int, cap: _Array) -> float:
     """
     full = 0.0
     for i in range(n):
-        full += cap[i]
+        if free[i] == 0.0:
+            full += cap[i]
     leak = _LEAK * total / full
     if leak > math.exp(-1.0 / _SOFTEST):
         return _SOFTEST
@@ -330,29 +371,34 @@ def softest_switching(total: float, n: int, cap: _Array) -> float:
 
 @inner_kernel
 def minimise_one(
-    x0: _Array, target: _Array, tof: float, c: float, z: float, n: int, dv: _Array, w: Workspace
+    x0: _Array,
+    target: _Array,
+    c: float,
+    z: float,
+    n: int,
+    n_forward: int,
+    dv: _Array,
+    w: Workspace,
 ) -> float:
     """Lower the impulses' sum of the closed, bounded arc `dv` in place; return it, inf if none."""
-    dt = tof / n
-    n_forward = n // 2
     b, gap, cap, lam, total = w.b[0], w.v[GAP], w.s[CAP], w.v[LAM], w.v[TOTAL]
     trial, linear, threshold, norm = w.n3[TRIAL], w.n3[LINEAR], w.s[THRESHOLD], w.s[NORM]
-    size = linearise(x0, dv, n, dt, target, w, gap)
+    size = linearise(x0, dv, n, target, w, gap)
     if not size < np.inf:
         return np.inf
-    if not restore_bounded(x0, dv, n, n_forward, dt, c, z, target, w):
+    if not restore_bounded(x0, dv, n, n_forward, c, z, target, w):
         return np.inf
     for i in range(n):
         threshold[i] = 1.0
     for i in range(6):
         lam[i] = 0.0
-    best = clip_to_thrust(dv, n, n_forward, c, z, cap)
-    softest = softest_switching(best, n, cap)
+    best = clip_to_thrust(dv, n, n_forward, c, z, w.s[FREE], cap)
+    softest = softest_switching(best, n, w.s[FREE], cap)
     sharpness = softest
     fraction = 1.0
     rejected = 0
     for _ in range(_OUTER):
-        size = linearise(x0, dv, n, dt, target, w, gap)
+        size = linearise(x0, dv, n, target, w, gap)
         if not size < np.inf:
             break
         for i in range(6):
@@ -362,7 +408,7 @@ def minimise_one(
                     total[i] += b[k, i, j] * dv[k, j]
         # lam lives in element coordinates between linearisations.
         multiply_lower_transposed(w.m[LOWER], lam)
-        clip_to_thrust(dv, n, n_forward, c, z, cap)
+        clip_to_thrust(dv, n, n_forward, c, z, w.s[FREE], cap)
         missing = least_propellant(b, total, lam, n, sharpness, linear, w)
         solve_lower_transposed(w.m[LOWER], lam)
         if not missing < _MISSING:
@@ -376,9 +422,11 @@ def minimise_one(
                 lam[i] = 0.0
             sharpness = softest
             continue
-        set_thresholds(linear, n, n_forward, c, norm, threshold)
+        set_thresholds(linear, n, n_forward, c, norm, w.s[FREE], threshold)
         predicted = 0.0
         for i in range(n):
+            if w.s[FREE, i] > 0.0:
+                continue
             predicted += math.sqrt(linear[i, 0] ** 2 + linear[i, 1] ** 2 + linear[i, 2] ** 2)
         sharp = sharpness <= _SHARPEST
         sharpness = max(0.4 * sharpness, _SHARPEST)
@@ -391,8 +439,8 @@ def minimise_one(
             for i in range(n):
                 for j in range(3):
                     trial[i, j] = dv[i, j] + fraction * (linear[i, j] - dv[i, j])
-            if restore_bounded(x0, trial, n, n_forward, dt, c, z, target, w):
-                new = clip_to_thrust(trial, n, n_forward, c, z, cap)
+            if restore_bounded(x0, trial, n, n_forward, c, z, target, w):
+                new = clip_to_thrust(trial, n, n_forward, c, z, w.s[FREE], cap)
                 if new < best - 0.05 * fraction * (best - predicted):
                     accepted = True
                     break
@@ -459,5 +507,6 @@ def minimum_batch(
             continue
         ce = c[row] / speed
         read_throttles(throttles[row], z[row], ce, n, frame, dv)
-        if minimise_one(x0, target, tof[row] * speed / length, ce, z[row], n, dv, w) < np.inf:
+        lay_timeline(tof[row] * speed / length, n, 0.0, 0.0, 1.0, w)
+        if minimise_one(x0, target, ce, z[row], n, n // 2, dv, w) < np.inf:
             mass_ratio[row] = write_throttles(dv, z[row], ce, n, frame, throttles[row])

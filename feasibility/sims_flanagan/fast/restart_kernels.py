@@ -21,7 +21,7 @@ from feasibility.sims_flanagan.fast.frame_kernels import (
     write_throttles,
 )
 from feasibility.sims_flanagan.fast.propellant_kernels import minimise_one
-from feasibility.sims_flanagan.fast.workspace_kernels import DV, E1, make_workspace
+from feasibility.sims_flanagan.fast.workspace_kernels import DV, E1, lay_timeline, make_workspace
 
 _Array = NDArray[np.float64]
 
@@ -200,6 +200,7 @@ def minimum_restarts(
         if not to_elements(x1, target):
             continue
         tof = tof_s[row] * speed / length
+        lay_timeline(tof, n, 0.0, 0.0, 1.0, w)
         c = exhaust[row] / speed
         best = -c * math.log(mass_ratio[row]) if mass_ratio[row] > 0.0 else np.inf
         count = two_impulse_starts(x0, x1, tof, c * z[row], n, starts, sums)
@@ -208,9 +209,9 @@ def minimum_restarts(
             if sums[s] > _DEARER * best:
                 break
             dv[:, :] = starts[s]
-            if not close(x0, dv, n, tof / n, target, 1e-9, int(12), w):
+            if not close(x0, dv, n, target, 1e-9, int(12), w):
                 continue
-            total = minimise_one(x0, target, tof, c, z[row], n, dv, w)
+            total = minimise_one(x0, target, c, z[row], n, n // 2, dv, w)
             if total < best:
                 best = total
                 winner[row] = s
