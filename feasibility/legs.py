@@ -8,15 +8,11 @@ from typing import Any, Self, final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from feasibility.constants import AU, DAY_S, G0, MU_SUN, YEAR_DAYS
+from feasibility.constants import DAY_S, G0
 from feasibility.errors import InputError
+from feasibility.leg_checks import check_excess, check_finite, check_state
 from feasibility.quantities import plain_numbers
 
-_MIN_RADIUS_M = 0.01 * AU
-_AU_SLIP_M = 1e6
-_MAX_RADIUS_M = 1e4 * AU
-_SLOW_FRACTION = 0.01
-_VELOCITY_SLIPS = {"km/s": 1e3, "AU/day": AU / DAY_S, "AU/year": AU / (DAY_S * YEAR_DAYS)}
 _MAX_TOF_DAYS = 1e5
 _MAX_THRUST_N = 1e3
 _MAX_ISP_S = 2e4
@@ -36,6 +32,8 @@ _UNITS = {
     "isp": ("s",),
     "m_dry": ("kg",),
     "t_dep_mjd2000": ("day",),
+    "vinf_dep": ("m/s",),
+    "vinf_arr": ("m/s",),
 }
 """What quantities with units are converted to; ids have none."""
 
@@ -112,7 +110,7 @@ class Legs:
     rv_dep, rv_arr : array_like
         (n, 6) float64, m and m/s: heliocentric state of the departure body at
         departure and of the arrival body at arrival. The leg is a rendezvous
-        at both ends.
+        at both ends, but for the excess velocities below.
     tof_days : array_like
         (n,) float64: time of flight in days.
     m0 : array_like
@@ -127,14 +125,20 @@ class Legs:
         (n,) float64: departure epoch. Not used by the dynamics.
     dep_id, arr_id : array_like, optional
         (n,) int64: ids of the bodies. Not used by the dynamics.
+    vinf_dep, vinf_arr : array_like
+        (n,) float64, m/s: by how much the velocity at departure may differ from that of
+        `rv_dep`, and at arrival from that of `rv_arr`, in any direction and for free. 0, as
+        unless given, is a rendezvous; `numpy.inf` asks for the position only (a fly-by at any
+        speed); a launch has `vinf_dep`, an unloading with some speed left `vinf_arr`. Where the
+        largest of all these values is from 0.1 to 20 m/s, they are taken for km/s and refused.
 
     Raises
     ------
     InputError
         A shape does not fit, a value is not finite or not positive, or a
         column is evidently in another unit (a position in AU or km, a
-        velocity in km/s, a time in seconds, a thrust in mN: one that accelerates
-        m0 by more than 0.01 m/s2). The message names the column and the first bad row.
+        velocity or an excess velocity in km/s, a time in seconds, a thrust in mN: one that
+        accelerates m0 by more than 0.01 m/s2). The message names the column and the first bad row.
 
     Examples
     --------
@@ -162,6 +166,8 @@ class Legs:
     t_dep_mjd2000: NDArray[np.float64] | None = None
     dep_id: NDArray[np.int64] | None = None
     arr_id: NDArray[np.int64] | None = None
+    vinf_dep: NDArray[np.float64] = dataclasses.field(kw_only=True)
+    vinf_arr: NDArray[np.float64] = dataclasses.field(kw_only=True)
 
     def __init__(
         self,
@@ -176,6 +182,8 @@ class Legs:
         t_dep_mjd2000: ArrayLike | None = None,
         dep_id: ArrayLike | None = None,
         arr_id: ArrayLike | None = None,
+        vinf_dep: ArrayLike = 0.0,
+        vinf_arr: ArrayLike = 0.0,
     ) -> None:
         given = {
             "rv_dep": rv_dep,
@@ -188,6 +196,8 @@ class Legs:
             "t_dep_mjd2000": t_dep_mjd2000,
             "dep_id": dep_id,
             "arr_id": arr_id,
+            "vinf_dep": vinf_dep,
+            "vinf_arr": vinf_arr,
         }
         optional = ("t_dep_mjd2000", "dep_id", "arr_id")
         arrays = {
@@ -216,6 +226,11 @@ class Legs:
     def exhaust_velocity(self) -> NDArray[np.float64]:
         """(n,) effective exhaust velocity isp * g0 in m/s."""
         return self.isp * G0
+
+    @property
+    def free_ends(self) -> NDArray[np.bool_]:
+        """(n,) whether a velocity may differ from the body's at one end or both."""
+        return np.asarray((self.vinf_dep > 0.0) | (self.vinf_arr > 0.0))
 
     def take(self, rows: ArrayLike) -> Self:
         """Return the legs at the given rows (indices or a boolean mask), in that order."""
@@ -279,14 +294,15 @@ class Legs:
         return legs
 
     def _validate(self) -> None:
-        _check_state("rv_dep", self.rv_dep)
-        _check_state("rv_arr", self.rv_arr)
+        check_state("rv_dep", self.rv_dep)
+        check_state("rv_arr", self.rv_arr)
         for name in ("tof_days", "thrust", "isp"):
             _check_scalar_column(f"Legs {name}", getattr(self, name), name)
         self._validate_masses()
         self._validate_acceleration()
         if self.t_dep_mjd2000 is not None:
-            _check_finite("Legs t_dep_mjd2000", self.t_dep_mjd2000)
+            check_finite("Legs t_dep_mjd2000", self.t_dep_mjd2000)
+        check_excess({name: getattr(self, name) for name in ("vinf_dep", "vinf_arr")})
 
     def _validate_masses(self) -> None:
         _check_scalar_column("Legs m0", self.m0, "m0")
@@ -376,14 +392,6 @@ def _broadcast(name: str, array: NDArray[Any], n: int) -> NDArray[Any]:
     return array
 
 
-def _check_finite(label: str, column: NDArray[np.float64]) -> None:
-    bad = ~np.isfinite(column)
-    if bad.any():
-        row, *component = (int(index) for index in np.argwhere(bad)[0])
-        where = f", component {component[0]}" if component else ""
-        raise InputError(f"{label}, row {row}{where}: {column[row, *component]} is not finite")
-
-
 # What a value beyond these limits usually is: (limit, unit that was probably meant).
 _UPPER_LIMITS = {
     "tof_days": (_MAX_TOF_DAYS, "days", "seconds"),
@@ -395,7 +403,7 @@ _UPPER_LIMITS = {
 
 
 def _check_scalar_column(label: str, column: NDArray[np.float64], name: str) -> None:
-    _check_finite(label, column)
+    check_finite(label, column)
     limit, unit, slip = _UPPER_LIMITS[name]
     not_positive = column < 0 if name == "m_dry" else column <= 0
     if not_positive.any():
@@ -408,36 +416,4 @@ def _check_scalar_column(label: str, column: NDArray[np.float64], name: str) -> 
         raise InputError(
             f"{label}, row {row}: {column[row]:g} {unit} is beyond {limit:g} {unit}; "
             f"is it in {slip}?"
-        )
-
-
-def _check_state(name: str, rv: NDArray[np.float64]) -> None:
-    _check_finite(f"Legs {name}", rv)
-    radius = np.sqrt(np.einsum("ij,ij->i", rv[:, :3], rv[:, :3]))
-    speed = np.sqrt(np.einsum("ij,ij->i", rv[:, 3:], rv[:, 3:]))
-    bad_radius = (radius < _MIN_RADIUS_M) | (radius > _MAX_RADIUS_M)
-    if bad_radius.any():
-        row = int(np.argmax(bad_radius))
-        slip = ""
-        if 0 < radius[row] < _AU_SLIP_M:
-            slip = "; is it in AU?"
-        elif 0 < radius[row] < _MIN_RADIUS_M:
-            slip = "; is it in km?"
-        raise InputError(
-            f"Legs {name}, row {row}: distance from the Sun {radius[row]:g} m, expected "
-            f"{_MIN_RADIUS_M:.2g} to {_MAX_RADIUS_M:.2g} m{slip}"
-        )
-    # The local circular speed tells metres from kilometres per second at any distance.
-    circular = np.sqrt(MU_SUN / radius)
-    slow = speed < _SLOW_FRACTION * circular
-    fast = speed > circular / _SLOW_FRACTION
-    if (slow | fast).any():
-        row = int(np.argmax(slow | fast))
-        slip = ""
-        for unit, metres_per_second in _VELOCITY_SLIPS.items():
-            if 0.2 < metres_per_second * speed[row] / circular[row] < 1.5:
-                slip = f"; is it in {unit}?"
-        raise InputError(
-            f"Legs {name}, row {row}: speed {speed[row]:g} m/s where a circular orbit has "
-            f"{circular[row]:.4g} m/s{slip}"
         )

@@ -67,6 +67,8 @@ def confirm(
     throttles: NDArray[np.float64],
     m0: NDArray[np.float64],
     m_final: NDArray[np.float64],
+    dep_excess: NDArray[np.float64] | None = None,
+    arr_excess: NDArray[np.float64] | None = None,
 ) -> NDArray[np.float64]:
     """Return the mismatch of given solutions, by pykep's own leg.
 
@@ -77,7 +79,9 @@ def confirm(
     throttles : (n, s, 3) float64
         Throttle vectors.
     m0, m_final : (n,) float64, kg
-        Initial and final masses.
+        Initial and final masses; both inf for a leg without thrust, which any mass can fly.
+    dep_excess, arr_excess : (n, 3) float64, m/s, optional
+        Velocities relative to the bodies; zero unless given.
 
     Returns
     -------
@@ -87,14 +91,42 @@ def confirm(
     """
     mismatch = np.full(len(legs), np.inf)
     usable = np.isfinite(throttles).all(axis=(1, 2)) & (m0 > 0) & (m_final > 0)
-    usable &= np.isfinite(m0) & np.isfinite(m_final)
+    thrustless = usable & np.isinf(m0) & np.isinf(m_final) & ~throttles.any(axis=(1, 2))
+    usable &= (np.isfinite(m0) & np.isfinite(m_final)) | thrustless
+    for excess in (dep_excess, arr_excess):
+        if excess is not None:
+            usable &= np.isfinite(excess).all(axis=1)
     for row in np.flatnonzero(usable):
-        leg = scaled_leg(legs, int(row), float(m0[row]), throttles.shape[1])
-        leg.mf = float(m_final[row] / m0[row])
+        mass = 1.0 if thrustless[row] else float(m0[row])
+        leg = scaled_leg(legs, int(row), mass, throttles.shape[1])
+        if not thrustless[row]:
+            leg.mf = float(m_final[row] / m0[row])
+        set_excess(leg, legs, int(row), dep_excess, arr_excess)
         leg.throttles = throttles[row].ravel().tolist()
         worst = float(np.abs(leg.compute_mismatch_constraints()).max())
         mismatch[row] = worst if np.isfinite(worst) else np.inf
     return mismatch
+
+
+def set_excess(
+    leg: Any,
+    legs: Legs,
+    row: int,
+    dep_excess: NDArray[np.float64] | None,
+    arr_excess: NDArray[np.float64] | None,
+) -> None:
+    """Give a scaled leg the excess velocities (n, 3) m/s of its row, where there are any."""
+    if dep_excess is not None and dep_excess[row].any():
+        leg.rvs = _scaled_state(with_excess(legs.rv_dep[row], dep_excess[row]))
+    if arr_excess is not None and arr_excess[row].any():
+        leg.rvf = _scaled_state(with_excess(legs.rv_arr[row], arr_excess[row]))
+
+
+def with_excess(rv: NDArray[np.float64], excess: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return states (..., 6) whose velocities have an excess (..., 3) added."""
+    state = rv.copy()
+    state[..., 3:] += excess
+    return state
 
 
 def _scaled_state(rv: NDArray[np.float64]) -> list[list[float]]:

@@ -25,6 +25,13 @@ TWO_IMPULSE: Final = 50
 """`LegSolutions.start` of the cheapest two-impulse arc; the next ones follow."""
 
 
+BALLISTIC: Final = 60
+"""`LegSolutions.start` of a leg that a Kepler arc flies within its excess velocities."""
+
+EXCESS_TOLERANCE: Final = 1e-6
+"""By how much an excess velocity may exceed its bound, relative to it, through rounding."""
+
+
 @final
 class Status(IntEnum):
     """How the solution of one leg ended."""
@@ -55,9 +62,10 @@ class LegSolutions:
         them in m/s.
     m0 : (n,) float64, kg
         Initial mass: the maximum initial mass m* or the given one; 0 where not
-        converged.
+        converged. inf where m* is asked for and the leg needs no thrust at all: its free
+        ends give it all, and any mass can be flown.
     m_final : (n,) float64, kg
-        Final mass; 0 where not converged.
+        Final mass; 0 where not converged, inf where `m0` is.
     mismatch : (n,) float64
         Largest absolute mismatch at the match point, in units of AU,
         `constants.EARTH_VELOCITY` and `m0`; inf where not converged.
@@ -70,6 +78,10 @@ class LegSolutions:
         Which start won (an index into the solver's own list), -1 where none did.
     seconds : (n,) float64
         Processor time spent on the leg.
+    dep_excess, arr_excess : (n, 3) float64, m/s
+        Velocity relative to the body at departure and at arrival, heliocentric frame, no longer
+        than the leg's `vinf_dep` and `vinf_arr`: zero at the ends of a rendezvous. NaN where not
+        converged.
     """
 
     throttles: NDArray[np.float64]
@@ -80,6 +92,8 @@ class LegSolutions:
     status: NDArray[np.int8]
     start: NDArray[np.int16]
     seconds: NDArray[np.float64]
+    dep_excess: NDArray[np.float64]
+    arr_excess: NDArray[np.float64]
 
     def __len__(self) -> int:
         return len(self.m0)
@@ -115,4 +129,6 @@ class LegSolutions:
             status=np.full(n_legs, Status.NOT_CONVERGED, dtype=np.int8),
             start=np.full(n_legs, -1, dtype=np.int16),
             seconds=np.zeros(n_legs),
+            dep_excess=np.full((n_legs, 3), np.nan),
+            arr_excess=np.full((n_legs, 3), np.nan),
         )

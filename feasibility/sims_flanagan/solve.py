@@ -1,5 +1,6 @@
 """The public face of the leg solvers: one function a question, one keyword for the method."""
 
+import dataclasses
 import importlib
 from collections.abc import Callable
 from typing import Any, Final
@@ -56,7 +57,8 @@ def max_initial_mass(
     Returns
     -------
     (n,) float64
-        m* in kg; 0 where no closed leg was found. A leg is flyable where its
+        m* in kg; 0 where no closed leg was found, inf where none is largest: the excess
+        velocities of `legs` give all that the leg needs. A leg is flyable where its
         `m0` is at most m*. m* is proportional to the thrust at given specific impulse.
 
     Raises
@@ -108,18 +110,20 @@ def solve_max_initial_mass(
     """
     segments = _segments(n_segments, guess)
     legs = _as_about_the_sun(legs, mu)
+    k = _speed_ratio(mu)
+    guess = None if guess is None else _with_excess_times(guess, 1.0 / k)
     if method == BOTH:
         fast: LegSolutions = _solver(_MAXIMUM_MASS, "fast")(legs, n_segments=segments)
         start = fast if guess is None else _better(fast, guess, fast.m0, guess.m0)
         # The reference keeps what it is given unless it finds a larger mass.
         best: LegSolutions = _solver(_MAXIMUM_MASS, "reference")(legs, guess=start)
-        return best
+        return _with_excess_times(best, k)
     solver = _solver(_MAXIMUM_MASS, method)
     if guess is not None and method != "reference":
         raise InputError(f"guess: method {method!r} takes none, expected method 'reference'")
     options = {"n_segments": segments} if guess is None else {"guess": guess}
     solutions: LegSolutions = solver(legs, **options)
-    return solutions
+    return _with_excess_times(solutions, k)
 
 
 def optimise(
@@ -161,15 +165,17 @@ def optimise(
     """
     segments = _segments(n_segments, guess)
     legs = _as_about_the_sun(legs, mu)
+    k = _speed_ratio(mu)
+    guess = None if guess is None else _with_excess_times(guess, 1.0 / k)
     if method == BOTH:
         if guess is None:
             guess = solve_max_initial_mass(legs, method=BOTH, n_segments=segments)
         fast: LegSolutions = _solver(_MINIMUM_PROPELLANT, "fast")(legs, guess=guess)
         slow: LegSolutions = _solver(_MINIMUM_PROPELLANT, "reference")(legs, guess=guess)
-        return _better(fast, slow, fast.m_final, slow.m_final)
+        return _with_excess_times(_better(fast, slow, fast.m_final, slow.m_final), k)
     solver = _solver(_MINIMUM_PROPELLANT, method)
     solutions: LegSolutions = solver(legs, guess=guess, n_segments=segments)
-    return solutions
+    return _with_excess_times(solutions, k)
 
 
 def _segments(n_segments: int | None, guess: LegSolutions | None) -> int:
@@ -192,7 +198,7 @@ def _as_about_the_sun(legs: Legs, mu: float) -> Legs:
         return legs
     if not (np.isfinite(mu) and mu > 0.0):
         raise InputError(f"mu: {mu}, expected a positive number of m3/s2")
-    k = float(np.sqrt(mu / MU_SUN))
+    k = _speed_ratio(mu)
     rv_dep, rv_arr = legs.rv_dep.copy(), legs.rv_arr.copy()
     rv_dep[:, 3:] /= k
     rv_arr[:, 3:] /= k
@@ -204,6 +210,22 @@ def _as_about_the_sun(legs: Legs, mu: float) -> Legs:
         thrust=legs.thrust / k**2,
         isp=legs.exhaust_velocity / (k * G0),
         m_dry=legs.m_dry,
+        vinf_dep=legs.vinf_dep / k,
+        vinf_arr=legs.vinf_arr / k,
+    )
+
+
+def _speed_ratio(mu: float) -> float:
+    """Return by how much the leg about the Sun is slower than that about `mu`."""
+    return 1.0 if mu == MU_SUN else float(np.sqrt(mu / MU_SUN))
+
+
+def _with_excess_times(solutions: LegSolutions, k: float) -> LegSolutions:
+    """Return solutions whose excess velocities are `k` times as large."""
+    if k == 1.0:
+        return solutions
+    return dataclasses.replace(
+        solutions, dep_excess=k * solutions.dep_excess, arr_excess=k * solutions.arr_excess
     )
 
 

@@ -146,9 +146,7 @@ def sensitivities(
 
 
 @inner_kernel
-def linearise(
-    x0: _Array, dv: _Array, n: int, target: _Array, w: Workspace, gap: _Array
-) -> float:
+def linearise(x0: _Array, dv: _Array, n: int, target: _Array, w: Workspace, gap: _Array) -> float:
     """Write whitened sensitivities and the whitened gap; return its norm, inf where it fails."""
     x = w.v[X]
     shoot_stm(x0, dv, n, w.s[COAST], x, w.m)
@@ -165,9 +163,7 @@ def linearise(
 
 
 @inner_kernel
-def subtract(
-    b: _Array, gap: _Array, fraction: float, n: int, dv: _Array, w: Workspace
-) -> None:
+def subtract(b: _Array, gap: _Array, fraction: float, n: int, dv: _Array, w: Workspace) -> None:
     """Take a fraction of the least-norm impulses with sum b_i dv_i = gap off `dv`.
 
     Free ends take part with their weights and stay within their bounds.

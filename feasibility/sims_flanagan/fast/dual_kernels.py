@@ -328,9 +328,7 @@ def _climb(
             if trial_work > 0.0:
                 trial_excess = _primers(b, trial, n, thrust, trial_primer, trial_norm, w)
                 if trial_work > trial_excess:
-                    trial_z = _bound(
-                        trial_norm, trial_work, z, n, n_forward, c, free, y, slope
-                    )
+                    trial_z = _bound(trial_norm, trial_work, z, n, n_forward, c, free, y, slope)
                     if trial_z > z:
                         better = True
                         break
@@ -425,9 +423,7 @@ def _pin_direction(b: _Array, lower: _Array, turned: _Array, u: _Array) -> None:
 
 
 @inner_kernel
-def _beyond_ends(
-    b: _Array, gap: _Array, n: int, lam: _Array, dv: _Array, w: Workspace
-) -> bool:
+def _beyond_ends(b: _Array, gap: _Array, n: int, lam: _Array, dv: _Array, w: Workspace) -> bool:
     """Write into `lam` what is left of a gap that free ends close as far as they can.
 
     Along this direction the ends do less work than the gap asks for. Where nothing is left,

@@ -222,9 +222,7 @@ def _turn_end(
 
 
 @inner_kernel
-def _curvature(
-    x0: _Array, n: int, c: float, lam: _Array, table: _Array, size: int, w: Workspace
-) -> bool:
+def _curvature(x0: _Array, n: int, lam: _Array, table: _Array, size: int, w: Workspace) -> bool:
     """Write the Hessian of the Lagrangian in the tangent steps; return False where it cannot.
 
     By differences of the primers: a disturbed impulse changes the arc after it only.
@@ -271,9 +269,7 @@ def _curvature(
             d1 = scale * (psi[4] - primer[k, 1])
             d2 = scale * (psi[5] - primer[k, 2])
             first = d0 * w.n3[_FIRST, k, 0] + d1 * w.n3[_FIRST, k, 1] + d2 * w.n3[_FIRST, k, 2]
-            second = (
-                d0 * w.n3[_SECOND, k, 0] + d1 * w.n3[_SECOND, k, 1] + d2 * w.n3[_SECOND, k, 2]
-            )
+            second = d0 * w.n3[_SECOND, k, 0] + d1 * w.n3[_SECOND, k, 1] + d2 * w.n3[_SECOND, k, 2]
             if row < 2 * n:
                 table[2 * k, row] = first
                 table[2 * k + 1, row] = second
@@ -282,9 +278,7 @@ def _curvature(
                 table[row, 2 * k + 1] = second
             if w.s[_LOOSE, k] > 0.0:
                 loose = size - 1 if k == n - 1 else 2 * n
-                table[loose, row] = (
-                    d0 * w.n3[_U, k, 0] + d1 * w.n3[_U, k, 1] + d2 * w.n3[_U, k, 2]
-                )
+                table[loose, row] = d0 * w.n3[_U, k, 0] + d1 * w.n3[_U, k, 1] + d2 * w.n3[_U, k, 2]
         if row < 2 * n:
             along = 0.0
             for j in range(3):
@@ -307,9 +301,7 @@ def _directions(dv: _Array, n: int, u: _Array) -> None:
 
 
 @inner_kernel
-def _responses(
-    n: int, c: float, pull: _Array, table: _Array, size: int, w: Workspace
-) -> None:
+def _responses(n: int, c: float, pull: _Array, table: _Array, size: int, w: Workspace) -> None:
     """Write how the end moves with z, `pull`, and with turns, right of the Hessian in `table`."""
     u, y, slope, b = w.n3[_U], w.s[Y], w.s[SLOPE], w.b[0]
     mean = 0.0
@@ -341,9 +333,7 @@ def _responses(
 
 
 @inner_kernel
-def _multipliers(
-    n: int, c: float, pull: _Array, table: _Array, size: int, w: Workspace
-) -> float:
+def _multipliers(n: int, c: float, pull: _Array, table: _Array, size: int, w: Workspace) -> float:
     """Write the multipliers, w.v[LAM], and primers by least squares across the thrust.
 
     The multipliers before whitening go to w.v[TRIAL_LAM]. Returns the mean of the primers,
@@ -513,7 +503,7 @@ def polish(
             break
         _responses(n, c, pull, table, size, w)
         mean = _multipliers(n, c, pull, table, size, w)
-        if not mean > 0.0 or not _curvature(x0, n, c, w.v[TRIAL_LAM], table, size, w):
+        if not mean > 0.0 or not _curvature(x0, n, w.v[TRIAL_LAM], table, size, w):
             break
         _stiffen(table, size, mean)
         new_z = np.inf
@@ -525,10 +515,7 @@ def polish(
                     break
                 dz = _newton_step(ease, pull, gap, rise, lam, lower)
                 _keep_excess(n, w)
-                if (
-                    abs(dz) < 0.3 * z
-                    and _turn(table, size, lam, n, u, trial, w) < _LARGEST_TURN
-                ):
+                if abs(dz) < 0.3 * z and _turn(table, size, lam, n, u, trial, w) < _LARGEST_TURN:
                     new_z = _close_again(
                         x0, n, n_forward, c, target, z + dz, ease, pull, table, size, w
                     )

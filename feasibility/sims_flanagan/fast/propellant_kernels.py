@@ -123,7 +123,7 @@ def restore_bounded(
 def _ease(k: int, share: float, w: Workspace) -> float:
     """Return the weight of an impulse in corrections: its share of full thrust, nearly."""
     if w.s[FREE, k] > 0.0:
-        return w.s[WEIGHT, k]
+        return float(w.s[WEIGHT, k])
     return share + _FLOOR
 
 
@@ -294,9 +294,7 @@ def least_propellant(
         for _ in range(15):
             for i in range(6):
                 trial[i] = lam[i] + fraction * step[i]
-            new_value = _dual_value(
-                b, total, trial, n, cap, threshold, sharpness, primer, norm, w
-            )
+            new_value = _dual_value(b, total, trial, n, cap, threshold, sharpness, primer, norm, w)
             if new_value > value + 1e-4 * fraction * decrement:
                 better = True
                 break

@@ -17,6 +17,7 @@ from feasibility.errors import InputError
 from feasibility.legs import Legs
 from feasibility.sims_flanagan.pykep_leg import N_SEGMENTS, confirm
 from feasibility.sims_flanagan.solutions import (
+    EXCESS_TOLERANCE,
     LIGHT,
     MISMATCH_TOLERANCE,
     THROTTLE_TOLERANCE,
@@ -32,6 +33,8 @@ _SPREAD: Final = 0.2 / np.array([1.0, 2.0, 3.0])
 _N_BENT: Final = 15
 # Rounding of masses that went through a file or through units.
 _MASS_ROUNDING: Final = 1e-6
+# Share of the escape velocity up to which the elements of the kernels are good.
+_MOST_BOUND: Final = 0.95
 
 
 def fast_max_initial_mass(
@@ -63,10 +66,9 @@ def fast_max_initial_mass(
         n rows. ``start`` is 0 to 4 for the nearest number of turns and 1, -1, 2, -2
         turns beside it, 5 to 20 for bent paths, 21 for a random one, 22 for one from
         the best solution, disturbed, 100 and above for the reference's
-        starts; ``seconds`` is the batch's time shared out evenly.
+        starts; ``seconds`` is the batch's time shared out evenly. Of legs with free ends
+        (`Legs.free_ends`) ``start`` is one of those of `free_kernels.free_maximum_batch`.
     """
-    from feasibility.sims_flanagan.fast.maximum_kernels import maximum_batch
-
     n = len(legs)
     rng = np.random.default_rng(0) if rng is None else rng
     shapes = _SPREAD * rng.standard_normal((n, extra_random_starts, 5, 3))
@@ -74,7 +76,36 @@ def fast_max_initial_mass(
     z = np.full(n, np.inf)
     start = np.full(n, -1, dtype=np.int64)
     ratio = np.zeros(n)
-    began = time.thread_time()
+    excess = np.zeros((n, 2, 3))
+    free = legs.free_ends
+    seconds = np.zeros(n)
+    for rows, solve in ((np.flatnonzero(~free), _solve), (np.flatnonzero(free), _solve_free)):
+        if not len(rows):
+            continue
+        began = time.thread_time()
+        some = (throttles[rows], z[rows], start[rows], ratio[rows], excess[rows])
+        solve(legs.take(rows), n_segments, shapes[rows], *some)
+        throttles[rows], z[rows], start[rows], ratio[rows], excess[rows] = some
+        seconds[rows] = (time.thread_time() - began) / len(rows)
+    with np.errstate(divide="ignore"):
+        m0 = legs.thrust * legs.tof_s / n_segments / (z * legs.exhaust_velocity)
+    solutions = _confirmed(legs, throttles, m0, m0 * ratio, start, seconds, excess)
+    return _with_reference(legs, solutions, n_segments) if fallback else solutions
+
+
+def _solve(
+    legs: Legs,
+    n_segments: int,
+    shapes: NDArray[np.float64],
+    throttles: NDArray[np.float64],
+    z: NDArray[np.float64],
+    start: NDArray[np.int64],
+    ratio: NDArray[np.float64],
+    excess: NDArray[np.float64],  # noqa: ARG001
+) -> None:
+    """Find the maximum initial mass of legs without free ends."""
+    from feasibility.sims_flanagan.fast.maximum_kernels import maximum_batch
+
     maximum_batch(
         # Copies are writable, as the one compiled signature wants them.
         legs.rv_dep.copy(),
@@ -90,10 +121,57 @@ def fast_max_initial_mass(
         start,
         ratio,
     )
-    seconds = np.full(n, (time.thread_time() - began) / max(n, 1))
-    m0 = legs.thrust * legs.tof_s / n_segments / (z * legs.exhaust_velocity)
-    solutions = _confirmed(legs, throttles, m0, m0 * ratio, start, seconds)
-    return _with_reference(legs, solutions, n_segments) if fallback else solutions
+
+
+def _solve_free(
+    legs: Legs,
+    n_segments: int,
+    shapes: NDArray[np.float64],
+    throttles: NDArray[np.float64],
+    z: NDArray[np.float64],
+    start: NDArray[np.int64],
+    ratio: NDArray[np.float64],
+    excess: NDArray[np.float64],
+) -> None:
+    """Find the maximum initial mass of legs with free ends."""
+    from feasibility.sims_flanagan.fast.free_kernels import free_maximum_batch
+
+    rv_dep, rv_arr = _bound_states(legs)
+    free_maximum_batch(
+        rv_dep,
+        rv_arr,
+        legs.tof_s,
+        legs.exhaust_velocity,
+        legs.vinf_dep.copy(),
+        legs.vinf_arr.copy(),
+        n_segments,
+        MU_SUN,
+        _bent_paths(),
+        shapes,
+        throttles,
+        z,
+        start,
+        ratio,
+        excess,
+    )
+    excess[:, 0] += rv_dep[:, 3:] - legs.rv_dep[:, 3:]
+    excess[:, 1] += rv_arr[:, 3:] - legs.rv_arr[:, 3:]
+
+
+def _bound_states(legs: Legs) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return end states (n, 6) for kernels that know ellipses only.
+
+    At an end where any velocity is right, that of an unbound orbit is replaced.
+    """
+    ends = []
+    for rv, bound in ((legs.rv_dep, legs.vinf_dep), (legs.rv_arr, legs.vinf_arr)):
+        state = rv.copy()
+        limit = _MOST_BOUND * np.sqrt(2.0 * MU_SUN / np.linalg.norm(rv[:, :3], axis=1))
+        speed = np.linalg.norm(rv[:, 3:], axis=1)
+        open_ = np.isinf(bound) & (speed > limit)
+        state[open_, 3:] *= (limit / speed)[open_, None]
+        ends.append(state)
+    return ends[0], ends[1]
 
 
 def fast_min_propellant(
@@ -128,8 +206,6 @@ def fast_min_propellant(
     InputError
         `guess` has another number of rows.
     """
-    from feasibility.sims_flanagan.fast.propellant_kernels import minimum_batch
-
     if guess is None:
         guess = fast_max_initial_mass(legs, n_segments=n_segments)
     if len(guess) != len(legs):
@@ -145,23 +221,20 @@ def fast_min_propellant(
     throttles = guess.throttles[rows] * (flyable.m0 / guess.m0[rows])[:, None, None]
     z = flyable.thrust * flyable.tof_s / n / (flyable.m0 * flyable.exhaust_velocity)
     ratio = np.zeros(len(rows))
-    began = time.thread_time()
-    minimum_batch(
-        flyable.rv_dep.copy(),
-        flyable.rv_arr.copy(),
-        flyable.tof_s,
-        flyable.exhaust_velocity,
-        z,
-        n,
-        MU_SUN,
-        throttles,
-        ratio,
-    )
     start = guess.start[rows].astype(np.int64)
-    _restart_light(flyable, guess.m0[rows], z, throttles, ratio, start)
-    seconds = np.full(len(rows), (time.thread_time() - began) / len(rows))
+    excess = np.stack([guess.dep_excess[rows], guess.arr_excess[rows]], axis=1)
+    seconds = np.zeros(len(rows))
+    free = flyable.free_ends
+    for part, solve in ((np.flatnonzero(~free), _lower), (np.flatnonzero(free), _lower_free)):
+        if not len(part):
+            continue
+        began = time.thread_time()
+        some = (throttles[part], ratio[part], start[part], excess[part])
+        solve(flyable.take(part), guess.m0[rows[part]], z[part], *some)
+        throttles[part], ratio[part], start[part], excess[part] = some
+        seconds[part] = (time.thread_time() - began) / len(part)
     m_final = flyable.m0 * ratio
-    found = _confirmed(flyable, throttles, flyable.m0, m_final, start, seconds)
+    found = _confirmed(flyable, throttles, flyable.m0, m_final, start, seconds, excess)
     merged = {name: getattr(solutions, name) for name in LegSolutions.__dataclass_fields__}
     enough = found.converged & (found.m_final >= flyable.m_dry)
     solutions.status[rows[found.converged & ~enough]] = Status.BELOW_DRY_MASS
@@ -169,6 +242,68 @@ def fast_min_propellant(
         column[rows[enough]] = getattr(found, name)[enough]
     solutions.seconds[rows] = seconds
     return solutions
+
+
+def _lower(
+    legs: Legs,
+    heaviest: NDArray[np.float64],
+    z: NDArray[np.float64],
+    throttles: NDArray[np.float64],
+    ratio: NDArray[np.float64],
+    start: NDArray[np.int64],
+    excess: NDArray[np.float64],  # noqa: ARG001
+) -> None:
+    """Lower the propellant of legs without free ends."""
+    from feasibility.sims_flanagan.fast.propellant_kernels import minimum_batch
+
+    minimum_batch(
+        legs.rv_dep.copy(),
+        legs.rv_arr.copy(),
+        legs.tof_s,
+        legs.exhaust_velocity,
+        z,
+        throttles.shape[1],
+        MU_SUN,
+        throttles,
+        ratio,
+    )
+    _restart_light(legs, heaviest, z, throttles, ratio, start)
+
+
+def _lower_free(
+    legs: Legs,
+    heaviest: NDArray[np.float64],
+    z: NDArray[np.float64],
+    throttles: NDArray[np.float64],
+    ratio: NDArray[np.float64],
+    start: NDArray[np.int64],
+    excess: NDArray[np.float64],
+) -> None:
+    """Lower the propellant of legs with free ends."""
+    from feasibility.sims_flanagan.fast.free_propellant_kernels import free_minimum_batch
+
+    rv_dep, rv_arr = _bound_states(legs)
+    moved = np.stack([rv_dep[:, 3:] - legs.rv_dep[:, 3:], rv_arr[:, 3:] - legs.rv_arr[:, 3:]], 1)
+    excess -= moved
+    winner = np.full(len(legs), -1, dtype=np.int64)
+    free_minimum_batch(
+        rv_dep,
+        rv_arr,
+        legs.tof_s,
+        legs.exhaust_velocity,
+        legs.vinf_dep.copy(),
+        legs.vinf_arr.copy(),
+        z,
+        legs.m0 * LIGHT < heaviest,
+        throttles.shape[1],
+        MU_SUN,
+        throttles,
+        ratio,
+        excess,
+        winner,
+    )
+    excess += moved
+    start[winner >= 0] = TWO_IMPULSE + winner[winner >= 0]
 
 
 def _restart_light(
@@ -220,11 +355,14 @@ def _confirmed(
     m_final: NDArray[np.float64],
     start: NDArray[np.int64],
     seconds: NDArray[np.float64],
+    excess: NDArray[np.float64],
 ) -> LegSolutions:
     """Return the solutions with those rows blanked that pykep's leg does not confirm."""
-    mismatch = confirm(legs, throttles, m0, m_final)
+    mismatch = confirm(legs, throttles, m0, m_final, excess[:, 0], excess[:, 1])
     norm = np.linalg.norm(throttles, axis=2).max(axis=1)
     good = (mismatch <= MISMATCH_TOLERANCE) & (norm <= 1.0 + THROTTLE_TOLERANCE)
+    for end, bound in enumerate((legs.vinf_dep, legs.vinf_arr)):
+        good &= np.linalg.norm(excess[:, end], axis=1) <= bound * (1.0 + EXCESS_TOLERANCE)
     return LegSolutions(
         throttles=np.where(good[:, None, None], throttles, np.nan),
         m0=np.where(good, m0, 0.0),
@@ -234,6 +372,8 @@ def _confirmed(
         status=np.where(good, Status.CONVERGED, Status.NOT_CONVERGED).astype(np.int8),
         start=np.where(good, start, -1).astype(np.int16),
         seconds=seconds,
+        dep_excess=np.where(good[:, None], excess[:, 0], np.nan),
+        arr_excess=np.where(good[:, None], excess[:, 1], np.nan),
     )
 
 

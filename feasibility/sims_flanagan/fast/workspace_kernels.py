@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from feasibility.runtime.jit import inner_kernel
 
-N_STARTS = 20
+N_STARTS = 26
 """Paths that can be under way at once: five numbers of turns, one random path, and for legs with
-free ends five more numbers of turns and nine Lambert arcs."""
+free ends five more numbers of turns, nine Lambert arcs and six along the bodies' own orbits."""
 
 MEMORY = 6
 """Steps that Anderson's rule remembers; at most 6, the size of the matrices at hand."""
@@ -129,4 +129,4 @@ def lay_timeline(
 @inner_kernel
 def has_free_ends(n: int, w: Workspace) -> bool:
     """Tell whether any of the leg's n impulses is the excess of a free end."""
-    return w.s[FREE, 0] > 0.0 or w.s[FREE, n - 1] > 0.0
+    return bool(w.s[FREE, 0] > 0.0 or w.s[FREE, n - 1] > 0.0)

@@ -3,7 +3,6 @@
 Slow, plain and independent of the fast solver, which it checks and backs up.
 """
 
-import functools
 import time
 from collections.abc import Iterator
 from typing import Any, NamedTuple
@@ -11,23 +10,31 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from feasibility.constants import EARTH_VELOCITY
 from feasibility.errors import InputError
 from feasibility.legs import Legs
 from feasibility.sims_flanagan.pykep_leg import CUT, N_SEGMENTS, confirm, scaled_leg
+from feasibility.sims_flanagan.reference.algorithms import evolve, ipopt, slsqp
 from feasibility.sims_flanagan.reference.pygmo_problems import (
     MaximumMassProblem,
     MinimumPropellantProblem,
+    Vector,
 )
 from feasibility.sims_flanagan.reference.starts import (
     FIRST_HOP,
     FIRST_RANDOM,
     FROM_GUESS,
     N_HOPS,
+    N_LAMBERT,
+    Start,
+    ballistic,
     bends,
+    cut,
     reference_starts,
     two_impulse_starts,
 )
 from feasibility.sims_flanagan.solutions import (
+    BALLISTIC,
     LIGHT,
     MISMATCH_TOLERANCE,
     THROTTLE_TOLERANCE,
@@ -39,16 +46,25 @@ from feasibility.sims_flanagan.solutions import (
 _MASS_ROUNDING = 1e-6
 _SAME_MASS = 1e-3
 _LEAST_IMPULSE = 1e-9
-_CONSTRAINT_ROUNDING = 1e-7
 
 
 class _Closed(NamedTuple):
-    """A closed leg: throttles (s, 3), masses in kg, mismatch."""
+    """A closed leg: throttles (s, 3), masses in kg, mismatch, excess velocities (3,) in m/s."""
 
     throttles: NDArray[np.float64]
     m0: float
     m_final: float
     mismatch: float
+    dep_excess: NDArray[np.float64]
+    arr_excess: NDArray[np.float64]
+
+
+class _Guess(NamedTuple):
+    """What an optimiser starts from: throttles (s, 3) and excess velocities (3,), scaled."""
+
+    throttles: NDArray[np.float64]
+    dep_excess: NDArray[np.float64]
+    arr_excess: NDArray[np.float64]
 
 
 def reference_max_initial_mass(
@@ -67,6 +83,7 @@ def reference_max_initial_mass(
     (`starts.reference_starts`); they stop when `agreement` of them have led to
     the best mass, so that a leg with one optimum costs little. A leg with many
     gets them all and is then solved again from its best solution, disturbed.
+    A leg that a Kepler arc flies within its excess velocities needs none: m* is inf.
     Neither the legs' `m0` nor `m_dry` plays a part.
 
     Parameters
@@ -116,18 +133,42 @@ def reference_max_initial_mass(
     for row in range(len(legs)):
         began = time.process_time()
         leg = scaled_leg(legs, row, float(legs.m0[row]), n_segments)
+        if _without_thrust(legs, row, solutions, leg):
+            solutions.seconds[row] = time.process_time() - began
+            continue
         masses: list[float] = []
         if guess is not None and guess.converged[row]:
             for found in _from_guess(legs, row, guess):
                 _keep_best(solutions, row, found, FROM_GUESS, masses)
-        for start, impulses in reference_starts(leg, n_random, rng):
-            if start < FIRST_RANDOM and _agreed(masses, agreement):
+        for start in reference_starts(leg, n_random, rng, *_bounds(legs, row)):
+            if start.number < FIRST_RANDOM and _agreed(masses, agreement):
                 continue
-            _keep_best(solutions, row, _maximise_mass(legs, row, impulses), start, masses)
+            _keep_best(solutions, row, _maximise_mass(legs, row, start), start.number, masses)
         if masses and not _agreed(masses, agreement):
             _hop(legs, row, solutions, masses)
         solutions.seconds[row] = time.process_time() - began
     return solutions
+
+
+def _bounds(legs: Legs, row: int) -> tuple[float, float]:
+    """Return the largest excess velocities of a leg, scaled."""
+    return (
+        float(legs.vinf_dep[row]) / EARTH_VELOCITY,
+        float(legs.vinf_arr[row]) / EARTH_VELOCITY,
+    )
+
+
+def _without_thrust(legs: Legs, row: int, solutions: LegSolutions, leg: Any) -> bool:
+    """Solve a leg that a Kepler arc within the bounds flies; return whether there is one."""
+    dep, arr = _bounds(legs, row)
+    both = ballistic(leg, dep, arr) if dep > 0.0 or arr > 0.0 else None
+    if both is None:
+        return False
+    guess = _Guess(np.zeros((leg.nseg, 3)), *both)
+    found = _confirmed(legs, row, guess, np.inf, np.inf)
+    if found is not None:
+        _put(solutions, row, found, BALLISTIC)
+    return found is not None
 
 
 def _hop(legs: Legs, row: int, solutions: LegSolutions, masses: list[float]) -> None:
@@ -136,19 +177,31 @@ def _hop(legs: Legs, row: int, solutions: LegSolutions, masses: list[float]) -> 
     A leg whose starts do not agree has many optima, and better ones lie near good ones.
     """
     for number, bend in enumerate(bends(solutions.n_segments, N_HOPS)):
-        throttles = solutions.throttles[row] + bend
+        best = _guess_of(solutions, row)
+        throttles = best.throttles + bend
         throttles /= np.maximum(1.0, np.linalg.norm(throttles, axis=1, keepdims=True))
         final = float(solutions.m_final[row] / solutions.m0[row])
-        found = _solve_maximum(legs, row, throttles, float(solutions.m0[row]), final)
+        bent = best._replace(throttles=throttles)
+        found = _solve_maximum(legs, row, bent, float(solutions.m0[row]), final)
         _keep_best(solutions, row, found, FIRST_HOP + number, masses)
 
 
 def _from_guess(legs: Legs, row: int, guess: LegSolutions) -> Iterator[_Closed | None]:
     """Yield the guess itself, if pykep's leg confirms it, and what IPOPT makes of it."""
-    throttles, mass = guess.throttles[row], float(guess.m0[row])
+    known, mass = _guess_of(guess, row), float(guess.m0[row])
     m_final = float(guess.m_final[row])
-    yield _confirmed(legs, row, throttles.ravel(), mass, m_final)
-    yield _solve_maximum(legs, row, throttles, mass, m_final / mass)
+    yield _confirmed(legs, row, known, mass, m_final)
+    if np.isfinite(mass):
+        yield _solve_maximum(legs, row, known, mass, m_final / mass)
+
+
+def _guess_of(solutions: LegSolutions, row: int) -> _Guess:
+    """Return a solution as something to start from."""
+    return _Guess(
+        solutions.throttles[row],
+        solutions.dep_excess[row] / EARTH_VELOCITY,
+        solutions.arr_excess[row] / EARTH_VELOCITY,
+    )
 
 
 def _keep_best(
@@ -161,8 +214,9 @@ def _keep_best(
         _put(solutions, row, found, start)
 
 
-def _maximise_mass(legs: Legs, row: int, impulses: NDArray[np.float64]) -> _Closed | None:
+def _maximise_mass(legs: Legs, row: int, start: Start) -> _Closed | None:
     """Return what IPOPT finds from one start, None if it does not close."""
+    impulses = start.impulses
     n_segments = len(impulses)
     leg = scaled_leg(legs, row, float(legs.m0[row]), n_segments)
     masses, final = _mass_profile(impulses, leg.veff)
@@ -171,17 +225,24 @@ def _maximise_mass(legs: Legs, row: int, impulses: NDArray[np.float64]) -> _Clos
     mass_unit = float(legs.m0[row] * leg.max_thrust * leg.tof / n_segments / pushes.mean())
     throttles = impulses * (masses / pushes.mean())[:, None]
     throttles /= np.maximum(1.0, np.linalg.norm(throttles, axis=1, keepdims=True))
-    return _solve_maximum(legs, row, throttles, mass_unit, final)
+    guess = _Guess(throttles, start.dep_excess, start.arr_excess)
+    return _solve_maximum(legs, row, guess, mass_unit, final)
 
 
 def _solve_maximum(
-    legs: Legs, row: int, throttles: NDArray[np.float64], mass_unit: float, final: float
+    legs: Legs, row: int, guess: _Guess, mass_unit: float, final: float
 ) -> _Closed | None:
-    """Run IPOPT from throttles, an initial mass of one unit and a final one of `final` units."""
-    leg = scaled_leg(legs, row, mass_unit, len(throttles))
-    guess = np.concatenate([throttles.ravel(), [1.0, final]])
-    x = _evolve(MaximumMassProblem(leg), guess, _ipopt())
-    return _confirmed(legs, row, x[:-2], float(x[-2]) * mass_unit, float(x[-1]) * mass_unit)
+    """Run IPOPT from a guess, an initial mass of one unit and a final one of `final` units."""
+    leg = scaled_leg(legs, row, mass_unit, len(guess.throttles))
+    problem = MaximumMassProblem(leg, *_bounds(legs, row))
+    x = evolve(problem, problem.decision(guess.throttles.ravel(), *guess[1:], [1.0, final]))
+    m0, m_final = float(x[-2]) * mass_unit, float(x[-1]) * mass_unit
+    return _confirmed(legs, row, _found(problem, x), m0, m_final)
+
+
+def _found(problem: MaximumMassProblem | MinimumPropellantProblem, x: Vector) -> _Guess:
+    """Return the part of a decision vector that is no mass."""
+    return _Guess(problem.throttles(x).reshape(-1, 3), *problem.excess(x))
 
 
 def _mass_profile(
@@ -254,39 +315,58 @@ def reference_min_propellant(
 def _minimise_propellant(legs: Legs, row: int, guess: LegSolutions) -> tuple[_Closed | None, int]:
     """Return the best of all starts, and the number of its start."""
     m0 = float(legs.m0[row])
+    if np.isinf(guess.m0[row]):
+        # No thrust is needed, and none can be less.
+        return _confirmed(legs, row, _guess_of(guess, row), m0, m0), int(guess.start[row])
     lighter = m0 / float(guess.m0[row])
-    throttles = guess.throttles[row].ravel() * lighter
+    known = _guess_of(guess, row)
+    known = known._replace(throttles=known.throttles * lighter)
     m_final = float(guess.m_final[row]) * lighter
-    best = _confirmed(legs, row, throttles, m0, m_final)
+    best = _confirmed(legs, row, known, m0, m_final)
     best_start = int(guess.start[row])
-    for algorithm in (_slsqp(), _ipopt()):
-        found = _solve_minimum(legs, row, throttles, m_final / m0, algorithm)
+    for algorithm in (slsqp(), ipopt()):
+        found = _solve_minimum(legs, row, known, m_final / m0, algorithm)
         if found is not None and (best is None or found.m_final > best.m_final):
             best = found
             break
     if lighter * LIGHT < 1.0:
-        for number, impulses in enumerate(two_impulse_starts(legs, row, guess.n_segments)):
-            masses, final = _mass_profile(impulses, float(legs.exhaust_velocity[row]))
+        for number, start in enumerate(_light_starts(legs, row, guess.n_segments)):
+            masses, final = _mass_profile(start.impulses, float(legs.exhaust_velocity[row]))
             push = legs.thrust[row] * legs.tof_s[row] / guess.n_segments / m0
-            throttles = impulses * (masses / push)[:, None]
+            throttles = start.impulses * (masses / push)[:, None]
             throttles /= np.maximum(1.0, np.linalg.norm(throttles, axis=1, keepdims=True))
-            found = _solve_minimum(legs, row, throttles.ravel(), final, _slsqp())
+            light = _Guess(throttles, start.dep_excess, start.arr_excess)
+            found = _solve_minimum(legs, row, light, final, slsqp())
             if found is not None and (best is None or found.m_final > best.m_final):
                 best, best_start = found, TWO_IMPULSE + number
     return best, best_start
 
 
+def _light_starts(legs: Legs, row: int, n_segments: int) -> Iterator[Start]:
+    """Yield starts of a leg that is far lighter than it could be; impulses in m/s."""
+    dep, arr = _bounds(legs, row)
+    if not (dep or arr):
+        for number, impulses in enumerate(two_impulse_starts(legs, row, n_segments)):
+            yield Start(number, impulses)
+        return
+    leg = scaled_leg(legs, row, float(legs.m0[row]), n_segments)
+    for start in reference_starts(leg, 0, None, dep, arr):
+        if start.number < N_LAMBERT:
+            yield start._replace(impulses=start.impulses * EARTH_VELOCITY)
+
+
 def _solve_minimum(
-    legs: Legs, row: int, throttles: NDArray[np.float64], final: float, algorithm: Any
+    legs: Legs, row: int, guess: _Guess, final: float, algorithm: Any
 ) -> _Closed | None:
-    """Return what an algorithm makes of throttles (3 s,) and a final mass in initial masses."""
+    """Return what an algorithm makes of a guess and a final mass in initial masses."""
     # The dry mass is compared with the optimum and is no bound of the problem:
     # as a bound it would make "needs too much propellant" look like "did not converge".
     m0 = float(legs.m0[row])
-    leg = scaled_leg(legs, row, m0, len(throttles) // 3)
-    guess = np.concatenate([throttles, [final]])
-    x = _evolve(MinimumPropellantProblem(leg), guess, algorithm)
-    return _confirmed(legs, row, x[:-1], m0, float(x[-1]) * m0)
+    leg = scaled_leg(legs, row, m0, len(guess.throttles))
+    problem = MinimumPropellantProblem(leg, *_bounds(legs, row))
+    start = problem.decision(guess.throttles.ravel(), *guess[1:], [final])
+    x = evolve(problem, start, algorithm)
+    return _confirmed(legs, row, _found(problem, x), m0, float(x[-1]) * m0)
 
 
 def _agreed(masses: list[float], agreement: int) -> bool:
@@ -304,6 +384,8 @@ def _put(solutions: LegSolutions, row: int, found: _Closed, start: int) -> None:
     solutions.converged[row] = True
     solutions.status[row] = Status.CONVERGED
     solutions.start[row] = start
+    solutions.dep_excess[row] = found.dep_excess
+    solutions.arr_excess[row] = found.arr_excess
 
 
 def _check_segments(n_segments: int) -> None:
@@ -311,50 +393,18 @@ def _check_segments(n_segments: int) -> None:
         raise InputError(f"n_segments: {n_segments}, expected at least 2")
 
 
-def _confirmed(
-    legs: Legs, row: int, throttles: NDArray[np.float64], m0: float, m_final: float
-) -> _Closed | None:
+def _confirmed(legs: Legs, row: int, found: _Guess, m0: float, m_final: float) -> _Closed | None:
     """Return the solution with throttles cut to 1, if pykep's leg confirms it."""
-    vectors = throttles.reshape(-1, 3)
+    vectors = found.throttles
     norms = np.linalg.norm(vectors, axis=1, keepdims=True)
     if not np.isfinite(norms).all() or norms.max() > 1.0 + THROTTLE_TOLERANCE:
         return None
     vectors = vectors / np.maximum(norms, 1.0)
-    mismatch = confirm(legs.take([row]), vectors[None], np.array([m0]), np.array([m_final])).item()
-    return _Closed(vectors, m0, m_final, mismatch) if mismatch < MISMATCH_TOLERANCE else None
-
-
-def _evolve(problem: Any, guess: NDArray[np.float64], algorithm: Any) -> NDArray[np.float64]:
-    import pygmo
-
-    wrapped = pygmo.problem(problem)
-    # pygmo keeps the guess unless the result is better under these tolerances.
-    wrapped.c_tol = [0.5 * MISMATCH_TOLERANCE] * 7 + [_CONSTRAINT_ROUNDING] * problem.n_segments
-    lower, upper = wrapped.get_bounds()
-    population = pygmo.population(wrapped)
-    population.push_back(np.clip(guess, lower, upper))
-    x: NDArray[np.float64] = algorithm.evolve(population).get_x()[0]
-    return x
-
-
-@functools.cache
-def _ipopt() -> Any:
-    import pygmo
-
-    solver = pygmo.ipopt()
-    solver.set_string_options({"sb": "yes"})
-    solver.set_integer_options({"print_level": 0, "max_iter": 200})
-    # An objective to 5 digits is enough; the constraints have to be far below the tolerance.
-    solver.set_numeric_options({"tol": 1e-5, "constr_viol_tol": 1e-7})
-    return pygmo.algorithm(solver)
-
-
-@functools.cache
-def _slsqp() -> Any:
-    import pygmo
-
-    solver = pygmo.nlopt("slsqp")
-    solver.maxeval = 1000
-    solver.ftol_rel = 1e-6
-    solver.xtol_rel = 0.0
-    return pygmo.algorithm(solver)
+    dep, arr = (
+        cut(scaled * EARTH_VELOCITY, float(bound[row]))
+        for scaled, bound in ((found.dep_excess, legs.vinf_dep), (found.arr_excess, legs.vinf_arr))
+    )
+    one = np.array([m0]), np.array([m_final]), dep[None], arr[None]
+    mismatch = confirm(legs.take([row]), vectors[None], *one).item()
+    closed = _Closed(vectors, m0, m_final, mismatch, dep, arr)
+    return closed if mismatch < MISMATCH_TOLERANCE else None

@@ -10,7 +10,7 @@ half-way, and the wandering ones.
 """
 
 from collections.abc import Iterator
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,8 +19,15 @@ from feasibility.constants import MU_SUN
 from feasibility.legs import Legs
 from feasibility.runtime.pykep_guard import load_pykep
 
-Start = tuple[int, NDArray[np.float64]]
-"""Index of the start and its (s, 3) impulses."""
+
+class Start(NamedTuple):
+    """Number of the start, its (s, 3) impulses and (3,) excess velocities at free ends."""
+
+    number: int
+    impulses: NDArray[np.float64]
+    dep_excess: NDArray[np.float64] = np.zeros(3)
+    arr_excess: NDArray[np.float64] = np.zeros(3)
+
 
 MAX_REVOLUTIONS: Final = 2
 """Lambert branches are tried up to this number of complete revolutions."""
@@ -34,6 +41,9 @@ N_WANDERING: Final = 6
 _SIZES = (1.0, 8.0, 0.25, 3.0)
 _TURN_SIZES = (3.0, 1.0)
 _BASE_SIZE = 0.2
+_RANDOM_EXCESS = 0.1
+_MOST_REVS = 8
+_ROUNDING = 1e-9
 
 FIRST_WANDERING: Final = N_LAMBERT + 2 * len(_SIZES) + 2 * len(_TURN_SIZES)
 """Index of the first wandering start; between it and the Lambert branches the tangential ones."""
@@ -54,7 +64,13 @@ _KNOTS = 4
 _TWO_IMPULSE_STARTS = 3
 
 
-def reference_starts(leg: Any, n_random: int, rng: np.random.Generator | None) -> Iterator[Start]:
+def reference_starts(
+    leg: Any,
+    n_random: int,
+    rng: np.random.Generator | None,
+    dep: float = 0.0,
+    arr: float = 0.0,
+) -> Iterator[Start]:
     """Yield the starts of one leg, those that win most often for their number first.
 
     Parameters
@@ -65,6 +81,10 @@ def reference_starts(leg: Any, n_random: int, rng: np.random.Generator | None) -
         Number of random starts after the fixed ones.
     rng : numpy.random.Generator, optional
         Source of the random starts; needed if `n_random` is not 0.
+    dep, arr : float
+        Largest excess velocities at the ends, scaled: that of a Lambert arc is cut to them, and
+        thrust along or against the velocity leaves with as much as it may; of the other
+        starts half have that of the first Lambert arc, half a random one.
 
     Yields
     ------
@@ -74,22 +94,70 @@ def reference_starts(leg: Any, n_random: int, rng: np.random.Generator | None) -
         against in other sizes, and turning round half-way; wandering directions;
         random ones.
     """
-    lambert = list(_lambert(leg))
-    tangential = list(_tangential(leg))
+    lambert = list(_lambert(leg, dep, arr))
+    tangential = list(_tangential(leg, dep))
     yield from (start for start in lambert if start[0] == 0)
     yield from tangential[:2]
     yield from (start for start in lambert if start[0] > 0)
     yield from tangential[2:]
+    ends = _Ends(dep, arr, lambert[0] if lambert else None, float(np.linalg.norm(leg.rvs[1])))
     # The wandering starts are part of the method, the same for every leg and every call.
-    yield from _wandering(leg, N_WANDERING, np.random.default_rng(0), FIRST_WANDERING)
+    fixed = np.random.default_rng(0)
+    yield from _wandering(leg, N_WANDERING, fixed, FIRST_WANDERING, ends)
     if rng is not None:
-        yield from _wandering(leg, n_random, rng, FIRST_RANDOM)
+        yield from _wandering(leg, n_random, rng, FIRST_RANDOM, ends)
 
 
-def _lambert(leg: Any) -> Iterator[Start]:
+class _Ends(NamedTuple):
+    """Bounds of the excess velocities, where to begin with them, and a speed to measure them."""
+
+    dep: float
+    arr: float
+    lambert: Start | None
+    speed: float
+
+    def excess(
+        self, number: int, rng: np.random.Generator
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return those of a start: Lambert's and random ones in turn."""
+        if not (self.dep or self.arr):
+            return np.zeros(3), np.zeros(3)
+        if number % 2 == 0 and self.lambert is not None:
+            return self.lambert.dep_excess, self.lambert.arr_excess
+        draws = rng.normal(size=(2, 3)) * _RANDOM_EXCESS * self.speed
+        return cut(draws[0], self.dep), cut(draws[1], self.arr)
+
+
+def cut(excess: NDArray[np.float64], bound: float) -> NDArray[np.float64]:
+    """Return an excess velocity (3,) of at most the bound."""
+    size = float(np.linalg.norm(excess))
+    return excess if size <= bound else excess * (bound / size)
+
+
+def ballistic(leg: Any, dep: float, arr: float) -> tuple[NDArray[np.float64], ...] | None:
+    """Return the excess velocities of the gentlest Kepler arc within the bounds, None without."""
+    (r_dep, v_dep), (r_arr, v_arr) = leg.rvs, leg.rvf
+    best: tuple[NDArray[np.float64], ...] | None = None
+    if np.cross(r_dep, r_arr)[2] == 0.0:
+        return None
+    for backward in (False, True):
+        arcs = load_pykep().lambert_problem(
+            r0=r_dep, r1=r_arr, tof=leg.tof, mu=leg.mu, cw=backward, multi_revs=_MOST_REVS
+        )
+        for v0, v1 in zip(arcs.v0, arcs.v1, strict=True):
+            both = np.array(v0) - v_dep, np.array(v1) - v_arr
+            first, second = (float(np.linalg.norm(excess)) for excess in both)
+            within = first <= dep + _ROUNDING and second <= arr + _ROUNDING
+            if within and (best is None or first + second < sum(map(np.linalg.norm, best))):
+                best = both
+    return None if best is None else (cut(best[0], dep), cut(best[1], arr))
+
+
+def _lambert(leg: Any, dep: float, arr: float) -> Iterator[Start]:
     """Yield the two impulses of every Lambert branch, each spread over its half of the leg.
 
-    The arcs turn as the departure orbit does, be it prograde or retrograde.
+    Excess velocities take over what they can. The arcs turn as the departure orbit does, be it
+    prograde or retrograde.
     """
     (r_dep, v_dep), (r_arr, v_arr) = leg.rvs, leg.rvf
     normal = np.cross(r_dep, r_arr)
@@ -103,11 +171,13 @@ def _lambert(leg: Any) -> Iterator[Start]:
     half = leg.nseg_fwd
     for branch, (v0, v1) in enumerate(zip(arcs.v0, arcs.v1, strict=True)):
         impulses = np.empty((leg.nseg, 3))
-        impulses[:half] = (np.array(v0) - v_dep) / half
-        impulses[half:] = (np.array(v_arr) - v1) / (leg.nseg - half)
+        first, second = np.array(v0) - v_dep, np.array(v1) - v_arr
         # The transfer plane is not defined at 180 degrees.
-        if np.isfinite(impulses).all():
-            yield branch, impulses
+        if np.isfinite(first).all() and np.isfinite(second).all():
+            leaving, arriving = cut(first, dep), cut(second, arr)
+            impulses[:half] = (first - leaving) / half
+            impulses[half:] = (arriving - second) / (leg.nseg - half)
+            yield Start(branch, impulses, leaving, arriving)
 
 
 def two_impulse_starts(legs: Legs, row: int, n_segments: int) -> NDArray[np.float64]:
@@ -124,7 +194,7 @@ def two_impulse_starts(legs: Legs, row: int, n_segments: int) -> NDArray[np.floa
     return found
 
 
-def _tangential(leg: Any) -> Iterator[Start]:
+def _tangential(leg: Any, dep: float) -> Iterator[Start]:
     """Yield impulses along and against the velocity of the coasted departure orbit."""
     pykep = load_pykep()
     along = np.empty((leg.nseg, 3))
@@ -137,19 +207,22 @@ def _tangential(leg: Any) -> Iterator[Start]:
     for sizes, directions in ((_SIZES, along), (_TURN_SIZES, turning)):
         for size in sizes:
             for sign in (1.0, -1.0):
-                yield index, sign * size * _impulse(leg) * directions
+                impulses = sign * size * _impulse(leg) * directions
+                leaving = cut(sign * _RANDOM_EXCESS * np.array(leg.rvs[1]), dep)
+                yield Start(index, impulses, leaving)
                 index += 1
 
 
 def _wandering(
-    leg: Any, n_starts: int, rng: np.random.Generator, first_index: int
+    leg: Any, n_starts: int, rng: np.random.Generator, first_index: int, ends: _Ends
 ) -> Iterator[Start]:
     """Yield impulses whose direction wanders smoothly from knot to knot, in two sizes."""
     for number in range(n_starts):
         path = _smooth_path(leg.nseg, rng)
         norms = np.maximum(np.linalg.norm(path, axis=1, keepdims=True), 1e-9)
         size = 1.0 if number % 2 else 3.0
-        yield first_index + number, size * _impulse(leg) * path / norms
+        impulses = size * _impulse(leg) * path / norms
+        yield Start(first_index + number, impulses, *ends.excess(number, rng))
 
 
 def bends(n_segments: int, n: int) -> Iterator[NDArray[np.float64]]:

@@ -1,0 +1,206 @@
+"""Minimum propellant of legs with free ends."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.runtime.jit import inner_kernel, kernel
+from feasibility.sims_flanagan.fast.arc_kernels import close
+from feasibility.sims_flanagan.fast.element_kernels import to_elements
+from feasibility.sims_flanagan.fast.frame_kernels import (
+    read_throttles,
+    scale_leg,
+    write_throttles,
+)
+from feasibility.sims_flanagan.fast.free_kernels import (
+    BRANCHES,
+    cut_towards,
+    lambert_arcs,
+    largest_excess,
+    write_excess,
+)
+from feasibility.sims_flanagan.fast.propellant_kernels import minimise_one
+from feasibility.sims_flanagan.fast.restart_kernels import spread_impulse
+from feasibility.sims_flanagan.fast.workspace_kernels import (
+    DV,
+    E1,
+    FREE,
+    STARTS,
+    Workspace,
+    lay_timeline,
+    make_workspace,
+)
+
+_DEARER = 1.2
+_MOST_STARTS = 4
+
+_Array = NDArray[np.float64]
+
+
+@inner_kernel
+def _put(
+    arc: _Array,
+    first: int,
+    n: int,
+    z: float,
+    c: float,
+    speed: float,
+    rows: int,
+    frame: _Array,
+    throttles: _Array,
+    excess: _Array,
+    w: Workspace,
+) -> float:
+    """Write throttles and excess velocities of an arc in the outer frame; return m_final / m0."""
+    for end in range(2):
+        for j in range(3):
+            excess[end, j] = 0.0
+    if first > 0:
+        write_excess(arc[0], 1.0, speed, frame, excess[0])
+    if w.s[FREE, rows - 1] > 0.0:
+        write_excess(arc[rows - 1], -1.0, speed, frame, excess[1])
+    segments = w.n3[STARTS]
+    for i in range(n):
+        for j in range(3):
+            segments[i, j] = arc[first + i, j]
+    return write_throttles(segments, z, c, n, frame, throttles)
+
+
+@inner_kernel
+def _lay_arc(
+    x0: _Array,
+    x1: _Array,
+    v0: _Array,
+    v1: _Array,
+    cap: float,
+    first: int,
+    n: int,
+    rows: int,
+    arc: _Array,
+    w: Workspace,
+) -> None:
+    """Write the impulses of a Lambert arc: excess up to its bounds, thrust for the rest."""
+    rest, cut = np.empty(3), np.empty(3)
+    segments = w.n3[STARTS]
+    for i in range(rows):
+        for j in range(3):
+            segments[i, j] = 0.0
+            arc[i, j] = 0.0
+    cut_towards(x0, v0, w.s[FREE, 0], cut)
+    for j in range(3):
+        rest[j] = v0[j] - cut[j]
+        if first > 0:
+            arc[0, j] = cut[j] - x0[3 + j]
+    spread_impulse(rest, int(0), cap, n, segments)
+    cut_towards(x1, v1, w.s[FREE, rows - 1], cut)
+    for j in range(3):
+        rest[j] = cut[j] - v1[j]
+        if w.s[FREE, rows - 1] > 0.0:
+            arc[rows - 1, j] = x1[3 + j] - cut[j]
+    spread_impulse(rest, n - 1, cap, n, segments)
+    for i in range(n):
+        for j in range(3):
+            arc[first + i, j] = segments[i, j]
+
+
+@kernel
+def free_minimum_batch(
+    rv0: _Array,
+    rv1: _Array,
+    tof_s: _Array,
+    exhaust: _Array,
+    vinf_dep: _Array,
+    vinf_arr: _Array,
+    z: _Array,
+    light: NDArray[np.bool_],
+    n: int,
+    mu: float,
+    throttles: _Array,
+    mass_ratio: _Array,
+    excess: _Array,
+    winner: NDArray[np.int64],
+) -> None:
+    """Lower the propellant of every leg of a batch, SI units.
+
+    Parameters
+    ----------
+    rv0, rv1 : (legs, 6) float64
+        End states.
+    tof_s, exhaust, vinf_dep, vinf_arr : (legs,) float64
+        Flight times, exhaust velocities, and largest excess velocities.
+    z : (legs,) float64
+        T dt / (m0 c) at the wanted initial mass.
+    light : (legs,) bool
+        Where Lambert's arcs are tried as well.
+    n : int
+        Segments.
+    mu : float
+        Gravitational parameter.
+    throttles : (legs, n, 3) float64
+        Holds throttles that close the leg at the wanted initial mass; receives better ones.
+    mass_ratio : (legs,) float64
+        Receives final over initial mass, 0 where the start did not close.
+    excess : (legs, 2, 3) float64
+        Holds the excess velocities of the start; receives those of the solution.
+    winner : (legs,) int64
+        Receives the number of the Lambert arc, 0 the cheapest, where one won.
+    """
+    w = make_workspace(n + 2)
+    frame = np.empty((3, 3))
+    x0 = np.empty(6)
+    x1 = np.empty(6)
+    v = np.empty((2, 2, BRANCHES, 3))
+    over = np.empty((2, BRANCHES))
+    target, dv = w.v[E1], w.n3[DV]
+    for row in range(rv0.shape[0]):
+        if not throttles[row].any():
+            # No thrust is needed, and none can be less.
+            mass_ratio[row] = 1.0
+            continue
+        length, speed = scale_leg(rv0[row], rv1[row], mu, frame, x0, x1)
+        if not to_elements(x1, target):
+            continue
+        c = exhaust[row] / speed
+        tof = tof_s[row] * speed / length
+        dep = largest_excess(x0, vinf_dep[row] / speed)
+        arr = largest_excess(x1, vinf_arr[row] / speed)
+        rows, forward = lay_timeline(tof, n, dep, arr, c * z[row], w)
+        first = 1 if dep > 0.0 else 0
+        read_throttles(throttles[row], z[row], c, n, frame, w.n3[STARTS])
+        for i in range(n):
+            for j in range(3):
+                dv[first + i, j] = w.n3[STARTS, i, j]
+        for j in range(3):
+            if first > 0:
+                dv[0, j] = 0.0
+                for k in range(3):
+                    dv[0, j] += frame[j, k] * excess[row, 0, k] / speed
+            if arr > 0.0:
+                dv[rows - 1, j] = 0.0
+                for k in range(3):
+                    dv[rows - 1, j] -= frame[j, k] * excess[row, 1, k] / speed
+        best = minimise_one(x0, target, c, z[row], rows, forward, dv, w)
+        if best < np.inf:
+            mass_ratio[row] = _put(
+                dv, first, n, z[row], c, speed, rows, frame, throttles[row], excess[row], w
+            )
+        if not light[row]:
+            continue
+        lambert_arcs(x0, x1, tof, dep, arr, v, over)
+        for s in range(_MOST_STARTS):
+            b = int(0)
+            for other in range(BRANCHES):
+                if over[0, other] < over[0, b]:
+                    b = other
+            if not over[0, b] < _DEARER * best:
+                break
+            over[0, b] = np.inf
+            _lay_arc(x0, x1, v[0, 0, b], v[0, 1, b], c * z[row], first, n, rows, dv, w)
+            if not close(x0, dv, rows, target, 1e-9, int(12), w):
+                continue
+            total = minimise_one(x0, target, c, z[row], rows, forward, dv, w)
+            if total < best:
+                best = total
+                winner[row] = s
+                mass_ratio[row] = _put(
+                    dv, first, n, z[row], c, speed, rows, frame, throttles[row], excess[row], w
+                )
