@@ -26,6 +26,7 @@ from feasibility.sims_flanagan.fast.workspace_kernels import (
     COAST,
     FREE,
     GAP,
+    LIMIT,
     LINEAR,
     LOWER,
     M_ONE,
@@ -96,11 +97,11 @@ def shoot_stm(x0: _Array, dv: _Array, n: int, coast: _Array, x: _Array, stm: _Ar
 def look_at_ends(dv: _Array, n: int, w: Workspace) -> None:
     """Write which free ends are at their bounds: these turn in corrections, and do not grow."""
     for i in range(0, n, max(n - 1, 1)):
-        free = w.s[FREE, i]
-        if free > 0.0:
+        limit = w.s[LIMIT, i]
+        if w.s[FREE, i] > 0.0:
             size = math.sqrt(dv[i, 0] ** 2 + dv[i, 1] ** 2 + dv[i, 2] ** 2)
             for j in range(3):
-                w.n3[ALONG, i, j] = dv[i, j] / size if size > _AT_BOUND * free else 0.0
+                w.n3[ALONG, i, j] = dv[i, j] / size if size > _AT_BOUND * limit else 0.0
 
 
 @inner_kernel
@@ -115,12 +116,12 @@ def let_ends_grow(n: int, w: Workspace) -> None:
 def clip_ends(dv: _Array, n: int, w: Workspace) -> None:
     """Shorten the excess velocities of free ends to their bounds."""
     for i in range(0, n, max(n - 1, 1)):
-        free = w.s[FREE, i]
-        if free > 0.0:
+        limit = w.s[LIMIT, i]
+        if w.s[FREE, i] > 0.0:
             size = math.sqrt(dv[i, 0] ** 2 + dv[i, 1] ** 2 + dv[i, 2] ** 2)
-            if size > free:
+            if size > limit:
                 for j in range(3):
-                    dv[i, j] *= free / size
+                    dv[i, j] *= limit / size
 
 
 @inner_kernel

@@ -16,6 +16,7 @@ from feasibility.sims_flanagan.fast.workspace_kernels import (
     FREE,
     HESSIAN,
     HESSIAN_LOWER,
+    M_TWO,
     NORM,
     PINNED,
     PRIMER,
@@ -28,6 +29,7 @@ from feasibility.sims_flanagan.fast.workspace_kernels import (
     Workspace,
     Y,
     has_free_ends,
+    open_end,
 )
 
 _DUAL_ITERATIONS = 40
@@ -36,6 +38,7 @@ _FULL = 0.995
 _LARGEST = 2.0
 _BACKWARD_LIMIT = 0.367
 _NO_THRUST = 1e-9
+_RIGID = 1e20
 _ROUNDS = 12
 _MET = 1e-7
 
@@ -276,10 +279,92 @@ def _curvature(
 
 
 @inner_kernel
+def turn_to_open_end(b: _Array, gap: _Array, lam: _Array, n: int, end: int, w: Workspace) -> None:
+    """Turn the coordinates so that an open end acts along the first three only.
+
+    Householder's reflections of b[end] (6, 3); they are kept for `turn_back`.
+    """
+    mirrors = w.m[M_TWO]
+    for col in range(3):
+        size = 0.0
+        for k in range(6):
+            mirrors[col, k] = b[end, k, col] if k >= col else 0.0
+            size += mirrors[col, k] ** 2
+        mirrors[col, col] += math.copysign(math.sqrt(size), mirrors[col, col])
+        _reflect_all(b, gap, lam, n, mirrors[col])
+
+
+@inner_kernel
+def turn_back(b: _Array, gap: _Array, lam: _Array, n: int, w: Workspace) -> None:
+    """Undo `turn_to_open_end`."""
+    for col in range(2, -1, -1):
+        _reflect_all(b, gap, lam, n, w.m[M_TWO, col])
+
+
+@inner_kernel
+def _reflect_all(b: _Array, gap: _Array, lam: _Array, n: int, mirror: _Array) -> None:
+    """Reflect sensitivities, gap and multipliers."""
+    square = 0.0
+    along_gap = along_lam = 0.0
+    for k in range(6):
+        square += mirror[k] * mirror[k]
+        along_gap += mirror[k] * gap[k]
+        along_lam += mirror[k] * lam[k]
+    for k in range(6):
+        gap[k] -= 2.0 * along_gap / square * mirror[k]
+        lam[k] -= 2.0 * along_lam / square * mirror[k]
+    for i in range(n):
+        for col in range(3):
+            along = 0.0
+            for k in range(6):
+                along += mirror[k] * b[i, k, col]
+            for k in range(6):
+                b[i, k, col] -= 2.0 * along / square * mirror[k]
+
+
+@inner_kernel
+def close_by_open_end(b: _Array, gap: _Array, n: int, end: int, dv: _Array) -> None:
+    """Write the excess of an open end that closes what the other impulses leave of the gap."""
+    for i in range(2, -1, -1):
+        rest = gap[i]
+        for k in range(n):
+            if k != end:
+                for j in range(3):
+                    rest -= b[k, i, j] * dv[k, j]
+        for j in range(i + 1, 3):
+            rest -= b[end, i, j] * dv[end, j]
+        dv[end, i] = rest / b[end, i, i]
+
+
+@inner_kernel
+def keep_out(h: _Array, grad: _Array, step: _Array) -> None:
+    """Take the first three coordinates out of a Newton step."""
+    trace = 0.0
+    for i in range(6):
+        trace += h[i, i]
+    for i in range(3):
+        grad[i] = step[i] = 0.0
+        h[i, i] = _RIGID * trace
+        for j in range(i + 1, 6):
+            h[j, i] = 0.0
+
+
+@inner_kernel
 def _climb(
-    b: _Array, gap: _Array, n: int, n_forward: int, c: float, lam: _Array, z: float, w: Workspace
+    b: _Array,
+    gap: _Array,
+    n: int,
+    n_forward: int,
+    c: float,
+    lam: _Array,
+    z: float,
+    end: int,
+    w: Workspace,
 ) -> float:
-    """Raise z(lam) by damped Newton steps from `lam` (norm 1); return z, -1 where it fails."""
+    """Raise z(lam) by damped Newton steps from `lam` (norm 1); return z, -1 where it fails.
+
+    With an open end, `end` of 0 or more, `lam` stays in the last three coordinates.
+    """
     primer, trial_primer, thrust = w.n3[PRIMER], w.n3[TRIAL_PRIMER], w.n3[THRUST]
     norm, trial_norm, y, slope = w.s[NORM], w.s[TRIAL_NORM], w.s[Y], w.s[SLOPE]
     pinned, free = w.s[PINNED], w.s[FREE]
@@ -304,6 +389,8 @@ def _climb(
         for i in range(6):
             grad[i] -= along * lam[i]
             step[i] = -grad[i]
+        if end >= 0:
+            keep_out(h, grad, step)
         if not cholesky(h, lower):
             return -1.0
         solve_lower(lower, step)
@@ -423,34 +510,39 @@ def _pin_direction(b: _Array, lower: _Array, turned: _Array, u: _Array) -> None:
 
 
 @inner_kernel
-def _beyond_ends(b: _Array, gap: _Array, n: int, lam: _Array, dv: _Array, w: Workspace) -> bool:
+def _beyond_ends(
+    b: _Array, gap: _Array, n: int, lam: _Array, dv: _Array, end: int, w: Workspace
+) -> bool:
     """Write into `lam` what is left of a gap that free ends close as far as they can.
 
     Along this direction the ends do less work than the gap asks for. Where nothing is left,
     returns False and leaves the excess velocities, alone, in `dv`.
     """
     matrix, rest = w.m[TURNED], w.m[HESSIAN]
+    low = 3 if end >= 0 else 0
     for i in range(n):
         for j in range(3):
             dv[i, j] = 0.0
     total = 0.0
-    for k in range(6):
+    for k in range(low, 6):
         total += gap[k] * gap[k]
     left = np.inf
     for _ in range(_ROUNDS):
         for i in range(0, n, max(n - 1, 1)):
-            if w.s[FREE, i] > 0.0:
-                for k in range(6):
+            if w.s[FREE, i] > 0.0 and i != end:
+                for k in range(low, 6):
                     value = gap[k]
                     for e in range(0, n, max(n - 1, 1)):
                         if e != i:
                             for j in range(3):
                                 value -= b[e, k, j] * dv[e, j]
                     rest[0, k] = value
-                _nearest_in_ball(b[i], rest[0], w.s[FREE, i], matrix, dv[i])
+                _nearest_in_ball(b[i], rest[0], low, w.s[FREE, i], matrix, dv[i])
         before = left
         left = 0.0
-        for k in range(6):
+        for k in range(low):
+            lam[k] = 0.0
+        for k in range(low, 6):
             lam[k] = gap[k]
             for e in range(0, n, max(n - 1, 1)):
                 for j in range(3):
@@ -462,8 +554,12 @@ def _beyond_ends(b: _Array, gap: _Array, n: int, lam: _Array, dv: _Array, w: Wor
 
 
 @inner_kernel
-def _nearest_in_ball(b: _Array, rest: _Array, radius: float, m: _Array, e: _Array) -> None:
+def _nearest_in_ball(
+    b: _Array, rest: _Array, first: int, radius: float, m: _Array, e: _Array
+) -> None:
     """Write the vector `e` (3,), no longer than `radius`, with the least |rest - b e|.
+
+    Only the coordinates from `first` on count.
 
     (b^T b + tau) e = b^T rest with tau of 0 or more, by a bisection in its logarithm.
     """
@@ -471,12 +567,12 @@ def _nearest_in_ball(b: _Array, rest: _Array, radius: float, m: _Array, e: _Arra
     for i in range(3):
         for j in range(i + 1):
             value = 0.0
-            for k in range(6):
+            for k in range(first, 6):
                 value += b[k, i] * b[k, j]
             m[i, j] = value
         trace += m[i, i]
         m[3, i] = 0.0
-        for k in range(6):
+        for k in range(first, 6):
             m[3, i] += b[k, i] * rest[k]
     size = math.sqrt(m[3, 0] ** 2 + m[3, 1] ** 2 + m[3, 2] ** 2)
     _solve_three(m, 1e-14 * trace, e)
@@ -541,10 +637,38 @@ def least_thrust(
     segments make up for most cheaply; `now` settles its sign where both are alike.
 
     Free ends are impulses with bounds of their own that do not depend on z, and may be shorter.
+    At an open end lam has to be perpendicular to all b^T: it has three dimensions.
 
     `b` and `gap` are whitened; `lam` holds the first guess and receives the
     solution, norm 1.
     """
+    end = open_end(n, w)
+    if end < 0:
+        return _least_thrust(b, gap, n, n_forward, c, lam, z, now, dv, end, w)
+    turn_to_open_end(b, gap, lam, n, end, w)
+    for i in range(3):
+        lam[i] = 0.0
+    z = _least_thrust(b, gap, n, n_forward, c, lam, z, now, dv, end, w)
+    close_by_open_end(b, gap, n, end, dv)
+    turn_back(b, gap, lam, n, w)
+    return z
+
+
+@inner_kernel
+def _least_thrust(
+    b: _Array,
+    gap: _Array,
+    n: int,
+    n_forward: int,
+    c: float,
+    lam: _Array,
+    z: float,
+    now: _Array,
+    dv: _Array,
+    end: int,
+    w: Workspace,
+) -> float:
+    """As `least_thrust`, in coordinates that are turned to an open end, if there is one."""
     primer, thrust = w.n3[PRIMER], w.n3[THRUST]
     norm, y, pinned = w.s[NORM], w.s[Y], w.s[PINNED]
     h, lower, turned = w.m[HESSIAN], w.m[HESSIAN_LOWER], w.m[TURNED]
@@ -556,7 +680,7 @@ def least_thrust(
         pinned[i] = 0.0
     if has_free_ends(n, w):
         excess = _primers(b, lam, n, thrust, primer, norm, w)
-        if not work > excess and not _beyond_ends(b, gap, n, lam, dv, w):
+        if not work > excess and not _beyond_ends(b, gap, n, lam, dv, end, w):
             # The ends close the gap alone.
             return _NO_THRUST
     elif not work > 0.0:
@@ -570,7 +694,7 @@ def least_thrust(
         return -1.0
     for i in range(6):
         lam[i] /= size
-    z = _climb(b, gap, n, n_forward, c, lam, z, w)
+    z = _climb(b, gap, n, n_forward, c, lam, z, end, w)
     if not z > 0.0:
         return -1.0
     some = False
@@ -584,6 +708,8 @@ def least_thrust(
             some = True
     if some:
         _curvature(b, n, c, y, primer, norm, thrust, pinned, lam, h, turned[5], turned)
+        if end >= 0:
+            keep_out(h, turned[5], turned[5])
         if not cholesky(h, lower):
             return -1.0
         for i in range(n):
@@ -594,7 +720,7 @@ def least_thrust(
                 for j in range(3):
                     thrust[i, j] += 1e-7 * now[i, j] / size
                 _pin_direction(b[i], lower, turned, thrust[i])
-        z = _climb(b, gap, n, n_forward, c, lam, z, w)
+        z = _climb(b, gap, n, n_forward, c, lam, z, end, w)
         if not z > 0.0:
             return -1.0
     for i in range(n):

@@ -30,9 +30,11 @@ from feasibility.sims_flanagan.fast.workspace_kernels import (
     FREE,
     INNER_0,
     INNER_1,
+    LIMIT,
     LONGITUDE,
     N_STARTS,
     NODES,
+    OPEN,
     START_LAM,
     STARTS,
     TURN_Z,
@@ -73,6 +75,7 @@ _MET = 1e-9
 _TYPICAL = (1e-5, 0.02)
 _FASTEST = 1.5
 _IN_LINE = 1e-9
+_MODERATE = 0.7
 _NUDGE = 1e-7
 
 _Array = NDArray[np.float64]
@@ -80,10 +83,14 @@ _Array = NDArray[np.float64]
 
 @inner_kernel
 def largest_excess(x: _Array, bound: float) -> float:
-    """Return the bound of the excess at a state, less where no ellipse could use it."""
+    """Return the bound of the excess at a state, less where no ellipse could use it.
+
+    `OPEN` is added where there is no bound.
+    """
     radius = math.sqrt(x[0] ** 2 + x[1] ** 2 + x[2] ** 2)
     speed = math.sqrt(x[3] ** 2 + x[4] ** 2 + x[5] ** 2)
-    return min(bound, speed + _FASTEST * math.sqrt(2.0 / radius))
+    most = speed + _FASTEST * math.sqrt(2.0 / radius)
+    return most + OPEN if bound == np.inf else min(bound, most)
 
 
 @inner_kernel
@@ -247,6 +254,28 @@ def _coasted(x: _Array, tof: float, there: _Array, w: Workspace) -> None:
 
 
 @inner_kernel
+def _make_moderate(x: _Array, other: _Array, tof: float, w: Workspace) -> None:
+    """Replace the velocity at an end where any is right, if it is not that of a moderate ellipse.
+
+    By that of the other end's orbit, or else by that of a circle.
+    """
+    e = w.v[INNER_0]
+    for attempt in range(3):
+        if to_elements(x, e) and e[1] ** 2 + e[2] ** 2 < _MODERATE:
+            return
+        if attempt == 0:
+            _coasted(other, tof, x, w)
+        else:
+            radius = math.sqrt(x[0] ** 2 + x[1] ** 2 + x[2] ** 2)
+            scale = 1.0 / math.sqrt(radius * (x[0] ** 2 + x[1] ** 2))
+            w.v[WORK, 3] = -scale * x[1]
+            w.v[WORK, 4] = scale * x[0]
+            w.v[WORK, 5] = 0.0
+        for j in range(3):
+            x[3 + j] = w.v[WORK, 3 + j]
+
+
+@inner_kernel
 def _lay_starts(
     x0: _Array,
     x1: _Array,
@@ -281,17 +310,19 @@ def _lay_starts(
             # Close to an orbit after a turn or half a turn Lambert's arcs are of no use.
             turns[s] = turns_of((s - _OWN) % 3)
             end = int(1) if s < _OWN + 3 else int(0)
-            free = w.s[FREE, n - 1] if end == 1 else w.s[FREE, 0]
-            if not free > 0.0:
+            at = n - 1 if end == 1 else int(0)
+            if not w.s[FREE, at] > 0.0:
                 continue
             _coasted(x0 if end == 1 else x1, tof if end == 1 else -tof, x1 if end == 1 else x0, w)
-            cut_towards(x1 if end == 1 else x0, w.v[WORK, 3:], free, ends[s, end])
+            cut_towards(x1 if end == 1 else x0, w.v[WORK, 3:], w.s[LIMIT, at], ends[s, end])
         elif s == _SPARE or not known:
             continue
         elif s < _ARCS:
             turns[s] = turns_of(s - _CUT)
-            cut_towards(x0, v[0, 0, best_branch], w.s[FREE, 0], ends[s, 0])
-            cut_towards(x1, v[0, 1, best_branch], w.s[FREE, n - 1], ends[s, 1])
+            dep = w.s[LIMIT, 0] if w.s[FREE, 0] > 0.0 else 0.0
+            arr = w.s[LIMIT, n - 1] if w.s[FREE, n - 1] > 0.0 else 0.0
+            cut_towards(x0, v[0, 0, best_branch], dep, ends[s, 0])
+            cut_towards(x1, v[0, 1, best_branch], arr, ends[s, 1])
         else:
             b = int(0)
             for other in range(BRANCHES):
@@ -465,6 +496,8 @@ def free_maximum_batch(
     x1 = np.empty(6)
     v = np.empty((2, 2, BRANCHES, 3))
     over = np.empty((2, BRANCHES))
+    body0 = np.empty(3)
+    body1 = np.empty(3)
     for row in range(rv0.shape[0]):
         length, speed = scale_leg(rv0[row], rv1[row], mu, frame, x0, x1)
         tof = tof_s[row] * speed / length
@@ -486,6 +519,13 @@ def free_maximum_batch(
             mass_ratio[row] = 1.0
             throttles[row, :, :] = 0.0
             continue
+        for j in range(3):
+            body0[j] = x0[3 + j]
+            body1[j] = x1[3 + j]
+        if vinf_arr[row] == np.inf:
+            _make_moderate(x1, x0, tof, w)
+        if vinf_dep[row] == np.inf:
+            _make_moderate(x0, x1, -tof, w)
         if not to_elements(x0, w.v[E0]) or not to_elements(x1, w.v[E1]):
             continue
         least = np.inf
@@ -508,9 +548,13 @@ def free_maximum_batch(
         first = int(0)
         if dep > 0.0:
             first = int(1)
-            write_excess(arc[0], 1.0, speed, frame, excess[row, 0])
+            for j in range(3):
+                body0[j] = x0[3 + j] + arc[0, j] - body0[j]
+            write_excess(body0, 1.0, speed, frame, excess[row, 0])
         if arr > 0.0:
-            write_excess(arc[rows - 1], -1.0, speed, frame, excess[row, 1])
+            for j in range(3):
+                body1[j] = x1[3 + j] - arc[rows - 1, j] - body1[j]
+            write_excess(body1, 1.0, speed, frame, excess[row, 1])
         for i in range(n):
             for j in range(3):
                 w.n3[DV, i, j] = arc[first + i, j]

@@ -24,7 +24,9 @@ from feasibility.sims_flanagan.fast.workspace_kernels import (
     DV,
     E1,
     FREE,
+    LIMIT,
     STARTS,
+    WORK,
     Workspace,
     lay_timeline,
     make_workspace,
@@ -48,16 +50,25 @@ def _put(
     frame: _Array,
     throttles: _Array,
     excess: _Array,
+    leads: _Array,
     w: Workspace,
 ) -> float:
-    """Write throttles and excess velocities of an arc in the outer frame; return m_final / m0."""
+    """Write throttles and excess velocities of an arc in the outer frame; return m_final / m0.
+
+    Its excess velocities are those beyond `leads` (2, 3).
+    """
     for end in range(2):
         for j in range(3):
             excess[end, j] = 0.0
+    total = w.v[WORK]
     if first > 0:
-        write_excess(arc[0], 1.0, speed, frame, excess[0])
+        for j in range(3):
+            total[j] = arc[0, j] + leads[0, j]
+        write_excess(total, 1.0, speed, frame, excess[0])
     if w.s[FREE, rows - 1] > 0.0:
-        write_excess(arc[rows - 1], -1.0, speed, frame, excess[1])
+        for j in range(3):
+            total[j] = leads[1, j] - arc[rows - 1, j]
+        write_excess(total, 1.0, speed, frame, excess[1])
     segments = w.n3[STARTS]
     for i in range(n):
         for j in range(3):
@@ -85,13 +96,14 @@ def _lay_arc(
         for j in range(3):
             segments[i, j] = 0.0
             arc[i, j] = 0.0
-    cut_towards(x0, v0, w.s[FREE, 0], cut)
+    cut_towards(x0, v0, w.s[LIMIT, 0] if first > 0 else 0.0, cut)
     for j in range(3):
         rest[j] = v0[j] - cut[j]
         if first > 0:
             arc[0, j] = cut[j] - x0[3 + j]
     spread_impulse(rest, int(0), cap, n, segments)
-    cut_towards(x1, v1, w.s[FREE, rows - 1], cut)
+    last = w.s[LIMIT, rows - 1] if w.s[FREE, rows - 1] > 0.0 else 0.0
+    cut_towards(x1, v1, last, cut)
     for j in range(3):
         rest[j] = cut[j] - v1[j]
         if w.s[FREE, rows - 1] > 0.0:
@@ -151,12 +163,23 @@ def free_minimum_batch(
     v = np.empty((2, 2, BRANCHES, 3))
     over = np.empty((2, BRANCHES))
     target, dv = w.v[E1], w.n3[DV]
+    leads = np.empty((2, 3))
     for row in range(rv0.shape[0]):
         if not throttles[row].any():
             # No thrust is needed, and none can be less.
             mass_ratio[row] = 1.0
             continue
         length, speed = scale_leg(rv0[row], rv1[row], mu, frame, x0, x1)
+        # Where any velocity is right, that of the start is as good as the body's.
+        for j in range(3):
+            leads[0, j] = leads[1, j] = 0.0
+            for k in range(3):
+                if vinf_dep[row] == np.inf:
+                    leads[0, j] += frame[j, k] * excess[row, 0, k] / speed
+                if vinf_arr[row] == np.inf:
+                    leads[1, j] += frame[j, k] * excess[row, 1, k] / speed
+            x0[3 + j] += leads[0, j]
+            x1[3 + j] += leads[1, j]
         if not to_elements(x1, target):
             continue
         c = exhaust[row] / speed
@@ -174,14 +197,16 @@ def free_minimum_batch(
                 dv[0, j] = 0.0
                 for k in range(3):
                     dv[0, j] += frame[j, k] * excess[row, 0, k] / speed
+                dv[0, j] -= leads[0, j]
             if arr > 0.0:
                 dv[rows - 1, j] = 0.0
                 for k in range(3):
                     dv[rows - 1, j] -= frame[j, k] * excess[row, 1, k] / speed
+                dv[rows - 1, j] += leads[1, j]
         best = minimise_one(x0, target, c, z[row], rows, forward, dv, w)
         if best < np.inf:
             mass_ratio[row] = _put(
-                dv, first, n, z[row], c, speed, rows, frame, throttles[row], excess[row], w
+                dv, first, n, z[row], c, speed, rows, frame, throttles[row], excess[row], leads, w
             )
         if not light[row]:
             continue
@@ -202,5 +227,16 @@ def free_minimum_batch(
                 best = total
                 winner[row] = s
                 mass_ratio[row] = _put(
-                    dv, first, n, z[row], c, speed, rows, frame, throttles[row], excess[row], w
+                    dv,
+                    first,
+                    n,
+                    z[row],
+                    c,
+                    speed,
+                    rows,
+                    frame,
+                    throttles[row],
+                    excess[row],
+                    leads,
+                    w,
                 )

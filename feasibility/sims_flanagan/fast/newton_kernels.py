@@ -35,6 +35,7 @@ from feasibility.sims_flanagan.fast.workspace_kernels import (
     HESSIAN,
     HESSIAN_LOWER,
     LAM,
+    LIMIT,
     LOWER,
     M_ONE,
     NORM,
@@ -218,7 +219,7 @@ def _turn_end(
     for j in range(3):
         trial[j] /= length
     if w.s[_LOOSE, i] > 0.0:
-        w.s[_EXCESS, i] = min(length, w.s[FREE, i])
+        w.s[_EXCESS, i] = min(length, w.s[LIMIT, i])
 
 
 @inner_kernel
@@ -449,8 +450,8 @@ def _look_at_ends(dv: _Array, n: int, w: Workspace) -> int:
         w.s[_LOOSE, i] = 0.0
         if w.s[FREE, i] > 0.0:
             size = math.sqrt(dv[i, 0] ** 2 + dv[i, 1] ** 2 + dv[i, 2] ** 2)
-            w.s[_EXCESS, i] = max(size, _SHORTEST * w.s[FREE, i])
-            if size < _AT_BOUND * w.s[FREE, i]:
+            w.s[_EXCESS, i] = max(size, _SHORTEST * w.s[LIMIT, i])
+            if size < _AT_BOUND * w.s[LIMIT, i]:
                 w.s[_LOOSE, i] = 1.0
                 count += 1
     return count

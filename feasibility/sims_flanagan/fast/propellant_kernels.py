@@ -14,6 +14,12 @@ from feasibility.sims_flanagan.fast.algebra_kernels import (
     solve_lower_transposed,
 )
 from feasibility.sims_flanagan.fast.arc_kernels import linearise, whitened_gap
+from feasibility.sims_flanagan.fast.dual_kernels import (
+    close_by_open_end,
+    keep_out,
+    turn_back,
+    turn_to_open_end,
+)
 from feasibility.sims_flanagan.fast.element_kernels import to_elements
 from feasibility.sims_flanagan.fast.frame_kernels import (
     backward_impulse,
@@ -30,6 +36,7 @@ from feasibility.sims_flanagan.fast.workspace_kernels import (
     HESSIAN,
     HESSIAN_LOWER,
     LAM,
+    LIMIT,
     LINEAR,
     LOWER,
     M_ONE,
@@ -47,6 +54,7 @@ from feasibility.sims_flanagan.fast.workspace_kernels import (
     Workspace,
     lay_timeline,
     make_workspace,
+    open_end,
 )
 
 _OUTER = 60
@@ -68,19 +76,18 @@ _Array = NDArray[np.float64]
 
 
 @inner_kernel
-def clip_to_thrust(
-    dv: _Array, n: int, n_forward: int, c: float, z: float, free: _Array, cap: _Array
-) -> float:
+def clip_to_thrust(dv: _Array, n: int, n_forward: int, c: float, z: float, w: Workspace) -> float:
     """Shorten impulses to full thrust, masses followed from z = T dt / (m0 c); write the bounds.
 
     Excess velocities of free ends are shortened to theirs. Returns the sum of the impulses, which
     is what the propellant grows with.
     """
+    free, limit, cap = w.s[FREE], w.s[LIMIT], w.s[CAP]
     total = 0.0
     for i in range(n):
         size = math.sqrt(dv[i, 0] ** 2 + dv[i, 1] ** 2 + dv[i, 2] ** 2)
         if free[i] > 0.0:
-            cap[i] = free[i]
+            cap[i] = limit[i]
             if size > cap[i]:
                 for j in range(3):
                     dv[i, j] *= cap[i] / size
@@ -142,7 +149,7 @@ def _correct_bounded(
     b, gap, cap = w.b[0], w.v[TRIAL_GAP], w.s[CAP]
     gram, lower = w.m[M_ONE], w.m[M_TWO]
     along = w.v[WORK]
-    clip_to_thrust(dv, n, n_forward, c, z, w.s[FREE], cap)
+    clip_to_thrust(dv, n, n_forward, c, z, w)
     size = whitened_gap(x0, dv, n, target, w, gap)
     if size < _CLOSED:
         return True
@@ -182,7 +189,7 @@ def _correct_bounded(
             dv[k, 0] -= weight * (d0 - radial * dv[k, 0])
             dv[k, 1] -= weight * (d1 - radial * dv[k, 1])
             dv[k, 2] -= weight * (d2 - radial * dv[k, 2])
-        clip_to_thrust(dv, n, n_forward, c, z, w.s[FREE], cap)
+        clip_to_thrust(dv, n, n_forward, c, z, w)
         new_size = whitened_gap(x0, dv, n, target, w, gap)
         if new_size < _CLOSED:
             return True
@@ -220,7 +227,7 @@ def _dual_value(
             size += p * p
         norm[i] = math.sqrt(size)
         if free:
-            value -= cap[i] * norm[i]
+            value -= w.s[FREE, i] * norm[i]
             continue
         u = (norm[i] - threshold[i]) / sharpness
         value -= cap[i] * sharpness * (max(u, 0.0) + math.log1p(math.exp(-abs(u))))
@@ -236,8 +243,33 @@ def least_propellant(
     The dual in lam (6,) is lam . total - sum cap_i max(0, |b_i^T lam| - threshold_i):
     thrust where the primer exceeds the threshold. The maximum is softened to
     sharpness * log(1 + exp(./sharpness)), and damped Newton steps are taken on lam.
-    Returns the part of `total` that is missing.
+    The excess at free ends costs nothing within its bounds. Returns the part of `total` that is
+    missing.
     """
+    end = open_end(n, w)
+    if end < 0:
+        return _least_propellant(b, total, lam, n, sharpness, linear, end, w)
+    turn_to_open_end(b, total, lam, n, end, w)
+    for i in range(3):
+        lam[i] = 0.0
+    missing = _least_propellant(b, total, lam, n, sharpness, linear, end, w)
+    close_by_open_end(b, total, n, end, linear)
+    turn_back(b, total, lam, n, w)
+    return missing
+
+
+@inner_kernel
+def _least_propellant(
+    b: _Array,
+    total: _Array,
+    lam: _Array,
+    n: int,
+    sharpness: float,
+    linear: _Array,
+    end: int,
+    w: Workspace,
+) -> float:
+    """As `least_propellant`, in coordinates that are turned to an open end, if there is one."""
     primer, norm, cap, threshold = w.n3[PRIMER], w.s[NORM], w.s[CAP], w.s[THRESHOLD]
     h, lower, step, trial = w.m[HESSIAN], w.m[HESSIAN_LOWER], w.v[STEP], w.v[TRIAL_LAM]
     along = w.v[WORK]
@@ -254,7 +286,7 @@ def least_propellant(
             thrust = cap[k] * share
             stiff = thrust * (1.0 - share) / sharpness
             if w.s[FREE, k] > 0.0:
-                thrust = cap[k]
+                thrust = w.s[FREE, k]
                 stiff = 0.0
             turn = thrust / norm[k]
             for i in range(6):
@@ -278,6 +310,8 @@ def least_propellant(
             trace += h[i, i]
         for i in range(6):
             h[i, i] += 1e-9 * trace + 1e-14
+        if end >= 0:
+            keep_out(h, step, step)
         if not cholesky(h, lower):
             break
         for i in range(6):
@@ -309,11 +343,11 @@ def least_propellant(
         u = (norm[k] - threshold[k]) / sharpness
         scale = cap[k] / (1.0 + math.exp(-min(max(u, -500.0), 500.0))) / norm[k]
         if w.s[FREE, k] > 0.0:
-            scale = cap[k] / norm[k]
+            scale = w.s[FREE, k] / norm[k]
         for j in range(3):
             linear[k, j] = scale * primer[k, j]
     missing = 0.0
-    for i in range(6):
+    for i in range(3 if end >= 0 else 0, 6):
         gap = -total[i]
         for k in range(n):
             for j in range(3):
@@ -390,7 +424,7 @@ def minimise_one(
         threshold[i] = 1.0
     for i in range(6):
         lam[i] = 0.0
-    best = clip_to_thrust(dv, n, n_forward, c, z, w.s[FREE], cap)
+    best = clip_to_thrust(dv, n, n_forward, c, z, w)
     softest = softest_switching(best, n, w.s[FREE], cap)
     sharpness = softest
     fraction = 1.0
@@ -406,7 +440,7 @@ def minimise_one(
                     total[i] += b[k, i, j] * dv[k, j]
         # lam lives in element coordinates between linearisations.
         multiply_lower_transposed(w.m[LOWER], lam)
-        clip_to_thrust(dv, n, n_forward, c, z, w.s[FREE], cap)
+        clip_to_thrust(dv, n, n_forward, c, z, w)
         missing = least_propellant(b, total, lam, n, sharpness, linear, w)
         solve_lower_transposed(w.m[LOWER], lam)
         if not missing < _MISSING:
@@ -438,7 +472,7 @@ def minimise_one(
                 for j in range(3):
                     trial[i, j] = dv[i, j] + fraction * (linear[i, j] - dv[i, j])
             if restore_bounded(x0, trial, n, n_forward, c, z, target, w):
-                new = clip_to_thrust(trial, n, n_forward, c, z, w.s[FREE], cap)
+                new = clip_to_thrust(trial, n, n_forward, c, z, w)
                 if new < best - 0.05 * fraction * (best - predicted):
                     accepted = True
                     break

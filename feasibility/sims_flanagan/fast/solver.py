@@ -33,8 +33,6 @@ _SPREAD: Final = 0.2 / np.array([1.0, 2.0, 3.0])
 _N_BENT: Final = 15
 # Rounding of masses that went through a file or through units.
 _MASS_ROUNDING: Final = 1e-6
-# Share of the escape velocity up to which the elements of the kernels are good.
-_MOST_BOUND: Final = 0.95
 
 
 def fast_max_initial_mass(
@@ -136,10 +134,9 @@ def _solve_free(
     """Find the maximum initial mass of legs with free ends."""
     from feasibility.sims_flanagan.fast.free_kernels import free_maximum_batch
 
-    rv_dep, rv_arr = _bound_states(legs)
     free_maximum_batch(
-        rv_dep,
-        rv_arr,
+        legs.rv_dep.copy(),
+        legs.rv_arr.copy(),
         legs.tof_s,
         legs.exhaust_velocity,
         legs.vinf_dep.copy(),
@@ -154,24 +151,6 @@ def _solve_free(
         ratio,
         excess,
     )
-    excess[:, 0] += rv_dep[:, 3:] - legs.rv_dep[:, 3:]
-    excess[:, 1] += rv_arr[:, 3:] - legs.rv_arr[:, 3:]
-
-
-def _bound_states(legs: Legs) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return end states (n, 6) for kernels that know ellipses only.
-
-    At an end where any velocity is right, that of an unbound orbit is replaced.
-    """
-    ends = []
-    for rv, bound in ((legs.rv_dep, legs.vinf_dep), (legs.rv_arr, legs.vinf_arr)):
-        state = rv.copy()
-        limit = _MOST_BOUND * np.sqrt(2.0 * MU_SUN / np.linalg.norm(rv[:, :3], axis=1))
-        speed = np.linalg.norm(rv[:, 3:], axis=1)
-        open_ = np.isinf(bound) & (speed > limit)
-        state[open_, 3:] *= (limit / speed)[open_, None]
-        ends.append(state)
-    return ends[0], ends[1]
 
 
 def fast_min_propellant(
@@ -282,13 +261,10 @@ def _lower_free(
     """Lower the propellant of legs with free ends."""
     from feasibility.sims_flanagan.fast.free_propellant_kernels import free_minimum_batch
 
-    rv_dep, rv_arr = _bound_states(legs)
-    moved = np.stack([rv_dep[:, 3:] - legs.rv_dep[:, 3:], rv_arr[:, 3:] - legs.rv_arr[:, 3:]], 1)
-    excess -= moved
     winner = np.full(len(legs), -1, dtype=np.int64)
     free_minimum_batch(
-        rv_dep,
-        rv_arr,
+        legs.rv_dep.copy(),
+        legs.rv_arr.copy(),
         legs.tof_s,
         legs.exhaust_velocity,
         legs.vinf_dep.copy(),
@@ -302,7 +278,6 @@ def _lower_free(
         excess,
         winner,
     )
-    excess += moved
     start[winner >= 0] = TWO_IMPULSE + winner[winner >= 0]
 
 

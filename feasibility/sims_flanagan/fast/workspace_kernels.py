@@ -20,6 +20,10 @@ MEMORY = 6
 
 _LIGHTEST = 0.1
 _HEAVIEST = 300.0
+_NEXT_TO_NOTHING = 1e-30
+
+OPEN = 1e3
+"""Added to the largest excess of an end where any velocity is right."""
 
 # Rows of Workspace.n3: per segment, three components.
 DV, TRIAL, LINEAR, RESIDUAL, PREVIOUS, PRIMER, TRIAL_PRIMER, THRUST, BEST = range(9)
@@ -35,9 +39,11 @@ D_NODES = D_MOVED + MEMORY
 NODES = D_NODES + MEMORY
 # Rows of Workspace.s: per segment, one number.
 NORM, TRIAL_NORM, Y, SLOPE, PINNED, CAP, THRESHOLD = range(7)
-# ... of a free end the largest excess, 0 for segments; its weight in corrections; the coast
-# before each impulse, and after the last one. `lay_timeline` writes them.
-FREE, WEIGHT, COAST = range(7, 10)
+# ... of a free end the largest excess, 0 for segments, and next to nothing for an open end, where
+# any velocity is right and linear problems leave the excess out; what no excess may exceed; its
+# weight in corrections; the coast before each impulse, and after the last one. `lay_timeline`
+# writes them.
+FREE, LIMIT, WEIGHT, COAST = range(7, 11)
 # Rows of Workspace.m after the n transition matrices, counted from the end.
 HESSIAN, HESSIAN_LOWER, TURNED, LOWER, M_ONE, M_TWO = range(-1, -7, -1)
 # Rows of Workspace.v: six components; the first three are scratch of element_derivatives.
@@ -72,14 +78,19 @@ def make_workspace(n: int) -> Workspace:
         np.zeros((2, n, 6, 3)),
         np.zeros((n + 6, 6, 6)),
         np.zeros((START_LAM + N_STARTS, 6)),
-        np.zeros((10, n + 1)),
+        np.zeros((11, n + 1)),
         np.zeros((3, N_STARTS)),
     )
 
 
 @inner_kernel
 def lay_timeline(
-    tof: float, n: int, dep: float, arr: float, typical: float, w: Workspace
+    tof: float,
+    n: int,
+    dep: float,
+    arr: float,
+    typical: float,
+    w: Workspace,
 ) -> tuple[int, int]:
     """Write when the impulses act and which are free ends; return how many, and in the first half.
 
@@ -90,7 +101,8 @@ def lay_timeline(
     n : int
         Segments.
     dep, arr : float
-        Largest excess at departure and arrival; an end with 0 has no impulse.
+        Largest excess at departure and arrival; an end with 0 has no impulse. `OPEN` or more
+        marks the one end where any velocity is right.
     typical : float
         Size of a segment's impulse: the excess may change as easily in corrections as they.
     w : Workspace
@@ -102,7 +114,7 @@ def lay_timeline(
         Impulses in all, and before the middle of the leg.
     """
     dt = tof / n
-    free, weight, coast = w.s[FREE], w.s[WEIGHT], w.s[COAST]
+    free, limit, weight, coast = w.s[FREE], w.s[LIMIT], w.s[WEIGHT], w.s[COAST]
     first = 1 if dep > 0.0 else 0
     last = 1 if arr > 0.0 else 0
     rows = n + first + last
@@ -122,7 +134,12 @@ def lay_timeline(
         coast[rows] = 0.0
     for i in range(rows):
         if free[i] > 0.0:
+            limit[i] = free[i]
             weight[i] = min(max(free[i] / typical, _LIGHTEST), _HEAVIEST) ** 2
+            if free[i] >= OPEN:
+                limit[i] = free[i] - OPEN
+                weight[i] = _HEAVIEST**2
+                free[i] = _NEXT_TO_NOTHING
     return rows, first + n // 2
 
 
@@ -130,3 +147,12 @@ def lay_timeline(
 def has_free_ends(n: int, w: Workspace) -> bool:
     """Tell whether any of the leg's n impulses is the excess of a free end."""
     return bool(w.s[FREE, 0] > 0.0 or w.s[FREE, n - 1] > 0.0)
+
+
+@inner_kernel
+def open_end(n: int, w: Workspace) -> int:
+    """Return which of the leg's n impulses is the excess of an open end; -1 if none."""
+    for i in range(0, n, max(n - 1, 1)):
+        if w.s[FREE, i] > 0.0 and w.s[LIMIT, i] > w.s[FREE, i]:
+            return i
+    return -1
