@@ -5,13 +5,26 @@ from importlib import metadata
 from typing import Final
 
 from feasibility.errors import InputError
+from seqsearch.tours.export.csv_file import CsvExporter
+from seqsearch.tours.export.json_file import JsonExporter
+from seqsearch.tours.export.oem import OemExporter
 from seqsearch.tours.export.protocol import Exporter
 from seqsearch.tours.export.rows import RowsExporter
+from seqsearch.tours.export.spk import Spk13Exporter, SpkExporter
+from seqsearch.tours.export.stk import StkExporter
 
 ENTRY_POINTS: Final = "seqsearch.exports"
 """Group of entry points by which other packages bring formats, named as their exporters."""
 
-_OURS: Final[tuple[type[Exporter], ...]] = (RowsExporter,)
+_OURS: Final[tuple[type[Exporter], ...]] = (
+    RowsExporter,
+    OemExporter,
+    SpkExporter,
+    Spk13Exporter,
+    StkExporter,
+    CsvExporter,
+    JsonExporter,
+)
 
 
 @cache

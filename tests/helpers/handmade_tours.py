@@ -1,0 +1,79 @@
+"""Tours that no search had to find: legs that end at bodies because the bodies were put there."""
+
+import numpy as np
+
+from feasibility.constants import AU, DAY_S, G0, MU_SUN
+from feasibility.orbits.classical import cartesian_to_classical
+from feasibility.orbits.kepler_kernels import propagate_batch
+from seqsearch import Tour
+from seqsearch.tours.motion import body_state
+from seqsearch.tours.records import Impulse, TourBody, TourLeg
+from seqsearch.tours.tour import TourRules
+
+_THRUST, _ISP, _SEGMENTS = 0.3, 3000.0, 10
+
+
+def handmade_tour(
+    names=("Alpha", "Beta", "Gamma", "Delta"), tof_days=120.0, stay_days=35.0, problem="handmade"
+):
+    """Return a tour of rendezvous that verifies: thrust along the path, from 2.2 AU outwards."""
+    body = TourBody(
+        id=11, name=names[0], epoch_mjd2000=7000.0, a_m=2.2 * AU, e=0.12, i_rad=0.1, node_rad=1.0,
+        argp_rad=2.0, mean_anomaly_rad=0.5,
+    )  # fmt: skip
+    bodies, legs, t, mass = [body], [], 8000.25, 2000.0
+    for k, name in enumerate(names[1:], 1):
+        leg, state = _leg(bodies[-1], 11 + k, t, tof_days + 7 * k, mass)
+        legs.append(leg)
+        bodies.append(_body(state, leg.t_arr_mjd2000, 11 + k, name))
+        t, mass = leg.t_arr_mjd2000 + stay_days, leg.m_final_kg
+    rules = TourRules(
+        name=problem, catalogue="a table", m0_kg=2000.0, m_dry_kg=800.0, thrust_n=_THRUST,
+        isp_s=_ISP, first_departure_mjd2000=(7900.0, 8100.0), max_duration_days=1500.0,
+        min_stay_days=30.0, start_ids=(),
+    )  # fmt: skip
+    return Tour(
+        rules=rules, t_start_mjd2000=legs[0].t_dep_mjd2000 if legs else t, bodies=tuple(bodies),
+        legs=tuple(legs), score=float(len(bodies)),
+    )  # fmt: skip
+
+
+def _leg(body, to_id, t_dep, tof_days, m0):
+    segment = tof_days / _SEGMENTS
+    state, t, mass, impulses = body_state(body, t_dep, MU_SUN), t_dep, m0, []
+    for k in range(_SEGMENTS):
+        epoch = t_dep + (k + 0.5) * segment
+        state = _coast(state, epoch - t)
+        # The engine rests in the middle of the leg, as it does where little thrust is needed.
+        throttle = 0.0 if k in (4, 5) else 0.8
+        after = mass
+        for _ in range(50):
+            dv = throttle * _THRUST * segment * DAY_S / (mass if k < _SEGMENTS // 2 else after)
+            after = mass * np.exp(-dv / (_ISP * G0))
+        along = state[3:] / np.linalg.norm(state[3:])
+        impulses.append(
+            Impulse(
+                t_mjd2000=epoch, dv_m_s=tuple((dv * along).tolist()),
+                throttle=tuple((throttle * along).tolist()), mass_before_kg=float(mass),
+                mass_after_kg=float(after),
+            )
+        )  # fmt: skip
+        state[3:] += dv * along
+        t, mass = epoch, after
+    leg = TourLeg(
+        from_id=body.id, to_id=to_id, t_dep_mjd2000=t_dep, tof_days=tof_days, m0_kg=float(m0),
+        m_final_kg=float(mass), m_star_kg=float(m0) * 1.04, impulses=tuple(impulses),
+    )  # fmt: skip
+    return leg, _coast(state, leg.t_arr_mjd2000 - t)
+
+
+def _coast(state, days):
+    return propagate_batch(state[None], np.array([days * DAY_S]), MU_SUN)[0]
+
+
+def _body(state, epoch, body_id, name):
+    a, e, i, node, argp, anomaly = cartesian_to_classical(state).tolist()
+    return TourBody(
+        id=body_id, name=name, epoch_mjd2000=epoch, a_m=a, e=e, i_rad=i, node_rad=node,
+        argp_rad=argp, mean_anomaly_rad=anomaly,
+    )  # fmt: skip
