@@ -5,7 +5,10 @@ import numpy as np
 from feasibility.constants import AU, DAY_S, G0, MU_SUN
 from feasibility.orbits.classical import cartesian_to_classical
 from feasibility.orbits.kepler_kernels import propagate_batch
-from seqsearch import Tour
+from seqsearch import Tour, read_config
+from seqsearch.beam.counters import RankCounters
+from seqsearch.pruning.audit_estimate import AuditedHop, RankAudit, Stratum
+from seqsearch.runs.run_folder import RunFolder
 from seqsearch.tours.motion import body_state
 from seqsearch.tours.records import Impulse, TourBody, TourLeg
 from seqsearch.tours.tour import TourRules
@@ -16,7 +19,7 @@ _THRUST, _ISP, _SEGMENTS = 0.3, 3000.0, 10
 def handmade_tour(
     names=("Alpha", "Beta", "Gamma", "Delta"), tof_days=120.0, stay_days=35.0, problem="handmade"
 ):
-    """Return a tour of rendezvous that verifies: thrust along the path, from 2.2 AU outwards."""
+    """Return a tour of rendezvous that verifies: thrust along the path and against it in turn."""
     body = TourBody(
         id=11, name=names[0], epoch_mjd2000=7000.0, a_m=2.2 * AU, e=0.12, i_rad=0.1, node_rad=1.0,
         argp_rad=2.0, mean_anomaly_rad=0.5,
@@ -50,7 +53,7 @@ def _leg(body, to_id, t_dep, tof_days, m0):
         for _ in range(50):
             dv = throttle * _THRUST * segment * DAY_S / (mass if k < _SEGMENTS // 2 else after)
             after = mass * np.exp(-dv / (_ISP * G0))
-        along = state[3:] / np.linalg.norm(state[3:])
+        along = (-1) ** to_id * state[3:] / np.linalg.norm(state[3:])
         impulses.append(
             Impulse(
                 t_mjd2000=epoch, dv_m_s=tuple((dv * along).tolist()),
@@ -77,3 +80,32 @@ def _body(state, epoch, body_id, name):
         id=body_id, name=name, epoch_mjd2000=epoch, a_m=a, e=e, i_rad=i, node_rad=node,
         argp_rad=argp, mean_anomaly_rad=anomaly,
     )  # fmt: skip
+
+
+def handmade_run(folder, tour=None, ranks=4):
+    """Write a run folder that no search made, with all that a report reads, and return it."""
+    tour = tour or handmade_tour()
+    rng = np.random.default_rng(5)
+    strata = {
+        "pruned": (Stratum(label="below 0.9", candidates=9e3, solved=40, flyable=1, far=True),),
+        "kept": (Stratum(label="kept", candidates=60.0, solved=20, flyable=18),),
+    }
+    counters = []
+    for rank in range(1, ranks + 1):
+        hops = tuple(
+            AuditedHop(
+                kept=k % 3 == 0, tof_days=float(days), margin=float(margin), flyable=margin > 1.0
+            )
+            for k, (days, margin) in enumerate(rng.uniform([40, 0.3], [240, 1.5], (60, 2)))
+        )
+        counters.append(
+            RankCounters(
+                pass_number=1 + rank % 2, rank=rank, nodes=10, proposed=9060, optimised=60,
+                pruned={"predictor": 8000, "default": 1000}, feasible=54, kept=10,
+                audit=RankAudit(**strata, hops=hops),
+            )
+        )  # fmt: skip
+    config = read_config("demo")
+    run = RunFolder.create(folder, config, 7)
+    run.write(tour, counters)
+    return folder
