@@ -72,11 +72,31 @@ def shoot(x0: _Array, u: _Array, dt: _Array, push: float, burn: float, nodes: _A
 
 @kernel
 def shoot_derivatives(
-    x0: _Array, u: _Array, dt: _Array, push: float, burn: float, nodes: _Array, jacobian: _Array
+    u: _Array,
+    dt: _Array,
+    push: float,
+    burn: float,
+    joined: bool,
+    nodes: _Array,
+    ends: _Array,
+    jacobian: _Array,
 ) -> None:
-    """As `shoot`; also write the derivatives (n, 6, 11) of each segment's end.
+    """Write the ends of all segments and their derivatives.
 
-    Columns: state and throttle vector at its beginning, mass, and size of the throttle.
+    Parameters
+    ----------
+    u, dt, push, burn
+        As `shoot`.
+    joined : bool
+        Whether each segment begins where the one before ends; otherwise at the given nodes.
+    nodes : (n + 1, 7) array
+        States and masses at the beginning of the segments and at the arrival. The first state is
+        given; the masses are written, and where segments are joined the other states.
+    ends : (n, 6) array
+        Written: states at the ends of the segments.
+    jacobian : (n, 6, 11) array
+        Written: derivatives of the ends by state and throttle vector at the beginning, by mass,
+        and by the size of the throttle.
     """
     r = np.empty((ORDER + 1, 3))
     w = np.empty(ORDER)
@@ -89,7 +109,6 @@ def shoot_derivatives(
     end = np.empty((6, 1))
     x = np.empty(6)
     step = np.empty((6, COLUMNS))
-    nodes[0, :6] = x0
     nodes[0, 6] = 1.0
     for k in range(len(dt)):
         x[:] = nodes[k, :6]
@@ -114,7 +133,9 @@ def shoot_derivatives(
             end_of(r, h, end, int(0))
             x[:] = end[:, 0]
             mass -= burn * s * h
-        nodes[k + 1, :6] = x
+        ends[k] = x
+        if joined:
+            nodes[k + 1, :6] = x
         nodes[k + 1, 6] = mass
 
 
@@ -140,13 +161,18 @@ def _compose(step: _Array, whole: _Array, burnt_by_size: float, first: bool) -> 
 
 
 @kernel
-def sensitivities(jacobian: _Array, dt: _Array, burn: float, b: _Array, by_size: _Array) -> None:
-    """Write the derivatives of the end of the arc by each throttle vector and each throttle size.
+def sensitivities(
+    jacobian: _Array, defects: _Array, dt: _Array, burn: float, b: _Array, by_size: _Array
+) -> _Array:
+    """Return the gap at the arrival; write its derivatives by all throttles.
 
     Parameters
     ----------
     jacobian : (n, 6, 11) array
         Of `shoot_derivatives`.
+    defects : (n, 6) array
+        Ends of the segments less the beginnings of those after them, in the last row less the
+        target: together they make the gap, to first order.
     dt : (n,) array
         Lengths of the segments.
     burn : float
@@ -155,10 +181,15 @@ def sensitivities(jacobian: _Array, dt: _Array, burn: float, b: _Array, by_size:
         Written: by the throttle vectors, at given masses.
     by_size : (n, 6) array
         Written: by the sizes of the throttles, which change all masses after them.
+
+    Returns
+    -------
+    (6,) array
     """
     m = np.eye(6)
     m_next = np.empty((6, 6))
     by_mass = np.zeros(6)
+    gap = np.zeros(6)
     for k in range(len(dt) - 1, -1, -1):
         part = jacobian[k]
         for i in range(6):
@@ -171,6 +202,7 @@ def sensitivities(jacobian: _Array, dt: _Array, burn: float, b: _Array, by_size:
             for j in range(6):
                 by_s += m[i, j] * part[j, SIZE]
                 by_m += m[i, j] * part[j, MASS]
+                gap[i] += m[i, j] * defects[k, j]
             by_size[k, i] = by_s - burn * dt[k] * by_mass[i]
             by_mass[i] += by_m
             for c in range(6):
@@ -179,3 +211,45 @@ def sensitivities(jacobian: _Array, dt: _Array, burn: float, b: _Array, by_size:
                     total += m[i, j] * part[j, c]
                 m_next[i, c] = total
         m[:] = m_next
+    return gap
+
+
+@kernel
+def follow(
+    jacobian: _Array,
+    defects: _Array,
+    dt: _Array,
+    burn: float,
+    du: _Array,
+    ds: _Array,
+    nodes: _Array,
+) -> None:
+    """Move the states `nodes` (n + 1, 7) as changes of the throttles do, to first order.
+
+    Parameters
+    ----------
+    jacobian, defects, dt, burn
+        As `sensitivities`.
+    du : (n, 3) array
+        Changes of the throttle vectors.
+    ds : (n,) array
+        Changes of their sizes.
+    nodes
+        As `shoot_derivatives`; overwritten.
+    """
+    x = np.zeros(6)
+    x_next = np.empty(6)
+    mass = 0.0
+    for k in range(len(dt)):
+        part = jacobian[k]
+        for i in range(6):
+            total = defects[k, i] + part[i, SIZE] * ds[k] + part[i, MASS] * mass
+            for j in range(6):
+                total += part[i, j] * x[j]
+            for c in range(3):
+                total += part[i, THROTTLE + c] * du[k, c]
+            x_next[i] = total
+        mass -= burn * dt[k] * ds[k]
+        for i in range(6):
+            x[i] = x_next[i]
+            nodes[k + 1, i] += x[i]

@@ -5,7 +5,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from feasibility.constants import MJD2000_MJD
+from feasibility.constants import DAY_S, MJD2000_MJD
 
 _SHORTEST_DAYS: Final = 1e-6
 """A remainder shorter than this lengthens the last day."""
@@ -53,3 +53,40 @@ def on_grid(throttles: NDArray[np.float64], edges: NDArray[np.float64]) -> NDArr
     passed = np.column_stack([np.interp(share, places, whole[:, c]) for c in range(3)])
     averages: NDArray[np.float64] = np.diff(passed, axis=0) / np.diff(share)[:, None]
     return averages
+
+
+def impulsive_path(
+    departure: NDArray[np.float64],
+    impulses_m_s: NDArray[np.float64],
+    edges: NDArray[np.float64],
+    mu: float,
+) -> NDArray[np.float64]:
+    """Return the (n + 1, 6) states at the epochs of a grid, flown with impulses.
+
+    Parameters
+    ----------
+    departure : (6,) array
+        State at the first epoch, m and m/s.
+    impulses_m_s : (s, 3) array
+        Changes of velocity at the centres of s equal segments.
+    edges : (n + 1,) array
+        Epochs, MJD2000.
+    mu : float
+        Gravitational parameter, m3/s2.
+    """
+    # Imported here: numba takes a while to load.
+    from feasibility.orbits.kepler_kernels import propagate_batch
+
+    times = (edges - edges[0]) * DAY_S
+    centres = (np.arange(len(impulses_m_s)) + 0.5) / len(impulses_m_s) * times[-1]
+    passed = np.searchsorted(centres, times)
+    path = np.empty((len(times), 6))
+    state, now = np.array(departure, dtype=np.float64), 0.0
+    for k in range(len(centres) + 1):
+        here = np.flatnonzero(passed == k)
+        path[here] = propagate_batch(np.tile(state, (len(here), 1)), times[here] - now, mu)
+        if k < len(centres):
+            state = propagate_batch(state[None], np.array([centres[k] - now]), mu)[0]
+            state[3:] += impulses_m_s[k]
+            now = float(centres[k])
+    return path

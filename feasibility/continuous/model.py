@@ -18,6 +18,12 @@ _STIFF: Final = 1e14
 _RESIDUAL: Final = 1e-13
 """Largest error of the convex problem's equations."""
 
+_CAUTIOUS: Final = (30.0, 5.0, 1.0, 0.2)
+"""Weights by which the multipliers are found where nothing is known of them."""
+
+_LARGEST_MISS: Final = 1e-9
+"""A larger miss in the model says that its equations were not solved."""
+
 _STEP_DAYS: Final = 2.0
 """By how much one iteration may move the arrival."""
 
@@ -62,8 +68,12 @@ class Linearisation:
 
     Attributes
     ----------
-    point : Point
-        The point.
+    throttles : (n, 3) array
+        The throttle vectors about which it is.
+    t_arr_mjd2000 : float
+        The arrival.
+    gap : (6,) array
+        What is to be closed.
     dt : (n,) array
         Lengths of the segments.
     by_throttle : (n, 6, 3) array
@@ -74,7 +84,9 @@ class Linearisation:
         By a delay of the arrival, per day.
     """
 
-    point: Point
+    throttles: _Array
+    t_arr_mjd2000: float
+    gap: _Array
     dt: _Array
     by_throttle: _Array
     by_size: _Array
@@ -185,42 +197,106 @@ class LegModel:
 
     def linearised(self, point: Point) -> Linearisation:
         """Return how the gap of a point changes."""
+        return self._linearised(point.edges_mjd2000, point.throttles, point.nodes.copy(), True)[0]
+
+    def joined(
+        self, edges_mjd2000: _Array, throttles: _Array, states: _Array, caution: Caution
+    ) -> tuple[_Array, _Array]:
+        """Return throttles and states after one iteration that joins the segments of a path.
+
+        A path of many revolutions may be near one that can be flown although its own throttles,
+        flown from the departure, lead somewhere else. So each segment first begins where the path
+        says ("multiple shooting").
+
+        Parameters
+        ----------
+        edges_mjd2000 : (n + 1,) array
+            Epochs of the segments.
+        throttles : (n, 3) array
+            Throttle vectors.
+        states : (n + 1, 6) array
+            Scaled states of the path at the epochs.
+        caution : Caution
+            How far to go.
+        """
+        from feasibility.continuous.arc_kernels import follow
+
+        nodes = np.empty((len(throttles) + 1, 7))
+        nodes[:, :6] = states
+        linear, jacobian, defects = self._linearised(edges_mjd2000, throttles, nodes, False)
+        step = self.best_step(linear, caution, np.zeros(6))
+        sizes = np.linalg.norm(step.throttles, axis=1) - np.linalg.norm(throttles, axis=1)
+        change = step.throttles - throttles
+        follow(jacobian, defects, linear.dt, self._burn, change, sizes, nodes)
+        return step.throttles, nodes[:, :6]
+
+    def _linearised(
+        self, edges_mjd2000: _Array, throttles: _Array, nodes: _Array, joined: bool
+    ) -> tuple[Linearisation, _Array, _Array]:
+        """Return the linearisation, derivatives of the segments, and where they do not meet."""
         from feasibility.continuous.arc_kernels import sensitivities, shoot_derivatives
 
-        dt = np.diff(point.edges_mjd2000) / self.scale.days
+        dt = np.diff(edges_mjd2000) / self.scale.days
         n = len(dt)
-        nodes, jacobian = np.empty((n + 1, 7)), np.empty((n, 6, 11))
+        ends, jacobian = np.empty((n, 6)), np.empty((n, 6, 11))
         by_throttle, by_size = np.empty((n, 6, 3)), np.empty((n, 6))
-        shoot_derivatives(
-            self._departure, point.throttles, dt, self._push, self._burn, nodes, jacobian
-        )
-        sensitivities(jacobian, dt, self._burn, by_throttle, by_size)
-        drift = _motion(nodes[-1, :6]) - _motion(self._target(point.edges_mjd2000))
-        drift[3:] += self._push * point.throttles[-1] / nodes[-1, 6]
-        return Linearisation(point, dt, by_throttle, by_size, drift / self.scale.days)
+        nodes[0, :6] = self._departure
+        shoot_derivatives(throttles, dt, self._push, self._burn, joined, nodes, ends, jacobian)
+        target = self._target(edges_mjd2000)
+        defects = ends - np.concatenate([nodes[1:-1, :6], target[None]])
+        gap = sensitivities(jacobian, defects, dt, self._burn, by_throttle, by_size)
+        drift = _motion(ends[-1]) - _motion(target)
+        drift[3:] += self._push * throttles[-1] / nodes[-1, 6]
+        drift /= self.scale.days
+        arrival = float(edges_mjd2000[-1])
+        linear = Linearisation(throttles, arrival, gap, dt, by_throttle, by_size, drift)
+        return linear, jacobian, defects
 
     def best_step(self, linear: Linearisation, caution: Caution, multipliers: _Array) -> Step:
-        """Return the best throttles of a linearisation, from the multipliers of the last one."""
+        """Return the best throttles of a linearisation.
+
+        Parameters
+        ----------
+        linear : Linearisation
+            The equations.
+        caution : Caution
+            How far to go.
+        multipliers : (6,) array
+            Those of the last iteration; zero where there was none.
+        """
+        step = None
+        if multipliers.any():
+            step = self._solved(linear, caution, multipliers)
+        if step is None or step.miss > _LARGEST_MISS:
+            # Without a good guess: from a problem so cautious that it is nearly quadratic.
+            multipliers = np.zeros(6)
+            for weight in _CAUTIOUS:
+                if weight > caution.throttles:
+                    cautious = Caution(weight, caution.arrival)
+                    multipliers = self._solved(linear, cautious, multipliers).multipliers
+            step = self._solved(linear, caution, multipliers)
+        return step
+
+    def _solved(self, linear: Linearisation, caution: Caution, multipliers: _Array) -> Step:
         from feasibility.continuous.dual_kernels import least_thrust
 
-        point, dt = linear.point, linear.dt
-        sizes = np.linalg.norm(point.throttles, axis=1)
-        bound = np.einsum("kij,kj->i", linear.by_throttle, point.throttles)
-        bound += linear.by_size.T @ sizes - point.gap
-        arrival = float(point.edges_mjd2000[-1])
+        sizes = np.linalg.norm(linear.throttles, axis=1)
+        bound = np.einsum("kij,kj->i", linear.by_throttle, linear.throttles)
+        bound += linear.by_size.T @ sizes - linear.gap
         earliest, latest = self._window
         # A delay also lengthens the thrust of the last segment.
         price = self.price_per_day + sizes[-1] / self.scale.days
-        low, high = max(earliest - arrival, -_STEP_DAYS), min(latest - arrival, _STEP_DAYS)
-        delay = np.array([price, caution.arrival, min(low, 0.0), max(high, 0.0), 0.0])
-        throttles, multipliers = np.empty_like(point.throttles), multipliers.copy()
+        low = min(0.0, max(earliest - linear.t_arr_mjd2000, -_STEP_DAYS))
+        high = max(0.0, min(latest - linear.t_arr_mjd2000, _STEP_DAYS))
+        delay = np.array([price, caution.arrival, low, high, 0.0])
+        throttles, multipliers = np.empty_like(linear.throttles), multipliers.copy()
         worst = least_thrust(
             multipliers,
             bound,
             linear.by_throttle,
             linear.by_size,
-            dt,
-            point.throttles,
+            linear.dt,
+            linear.throttles,
             caution.throttles,
             _STIFF,
             linear.by_delay,
@@ -228,7 +304,7 @@ class LegModel:
             _RESIDUAL,
             throttles,
         )
-        cost = float(np.linalg.norm(throttles, axis=1) @ dt)
+        cost = float(np.linalg.norm(throttles, axis=1) @ linear.dt)
         miss = float(np.linalg.norm(multipliers)) / _STIFF + worst
         return Step(throttles, float(delay[4]), multipliers, cost, miss)
 

@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from feasibility.continuous.grid import daily_edges, file_epoch, on_grid
+from feasibility.continuous.grid import daily_edges, file_epoch, impulsive_path, on_grid
 from feasibility.continuous.leg import ContinuousArc, ContinuousLeg
 from feasibility.continuous.model import Caution, LegModel, Point, Step
 from feasibility.errors import InputError
@@ -36,6 +36,13 @@ _BEND: Final = 1e-3
 _SETTLE_AFTER: Final = 3
 """Iterations after which the arrival is moved with ever more caution."""
 
+_NEAR: Final = 1e-4
+"""Gap from which throttles are near enough to a solution to be flown from the departure on."""
+
+_JOININGS: Final = 20
+_JOINING: Final = Caution(0.3, 1e3)
+"""How often segments are joined before that, and how cautiously; the arrival stays."""
+
 _TAKEN: Final = 0.1
 _TRUSTED: Final = 0.7
 """Share of the promised gain from which a step is taken, and the next one may be bolder."""
@@ -46,6 +53,7 @@ def refine_leg(
     t_arr_mjd2000: float,
     throttles: ArrayLike,
     *,
+    impulses_m_s: ArrayLike | None = None,
     arrival_mjd2000: tuple[float, float] | None = None,
     time_price: float = TIME_PRICE,
 ) -> ContinuousArc:
@@ -61,6 +69,9 @@ def refine_leg(
         Arrival to begin with; later than the departure.
     throttles : array_like
         (s, 3) throttle vectors of s equal segments, for instance of a Sims-Flanagan solution.
+    impulses_m_s : array_like, optional
+        (s, 3) impulses at the centres of these segments. They give the path to begin with, which
+        legs of several revolutions need.
     arrival_mjd2000 : tuple of float, optional
         Earliest and latest arrival; default: as given.
     time_price : float
@@ -89,8 +100,27 @@ def refine_leg(
     earliest, latest = (float(file_epoch(epoch)) for epoch in window)
     model = LegModel(leg, (earliest, latest), time_price)
     edges = daily_edges(leg.t_dep_mjd2000, t_arr_mjd2000)
-    point, converged, iterations = _iterate(model, model.point(edges, on_grid(start, edges)))
+    point = model.point(edges, on_grid(start, edges))
+    if impulses_m_s is not None and point.gap_size > _NEAR:
+        path = impulsive_path(
+            leg.departure, np.array(impulses_m_s, dtype=np.float64), edges, leg.mu_m3_s2
+        )
+        point = _from_path(model, point, path)
+    point, converged, iterations = _iterate(model, point)
     return _arc(model, point, converged, iterations)
+
+
+def _from_path(model: LegModel, point: Point, path: _Array) -> Point:
+    """Return a point near a path whose throttles alone do not follow it."""
+    best, throttles, states = point, point.throttles, model.scale.state(path)
+    for _ in range(_JOININGS):
+        throttles, states = model.joined(point.edges_mjd2000, throttles, states, _JOINING)
+        trial = model.point(point.edges_mjd2000, throttles)
+        if trial.gap_size < best.gap_size:
+            best = trial
+        if best.gap_size < _NEAR:
+            break
+    return best
 
 
 def _iterate(model: LegModel, point: Point) -> tuple[Point, bool, int]:
