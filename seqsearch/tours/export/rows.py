@@ -4,9 +4,9 @@ A line each day at most, and at arrivals::
 
     MJD x y z vx vy vz m Tx Ty Tz      km, km/s, kg, N
 
-with blanks between and 17 digits, so that numbers come back as they were. Thrust is constant from a
-row to the next and zero in the last row of a phase. ``# phase K: FROM -> TO`` opens phase K; other
-lines that begin with ``#`` are comments.
+with blanks between and 17 digits, so that numbers come back as they were. Thrust is constant
+from a row to the next, and zero in the last row of a phase. ``# phase K: FROM -> TO`` opens
+phase K; other lines that begin with ``#`` are comments.
 """
 
 import re
@@ -24,6 +24,7 @@ from seqsearch.tours.export.protocol import Flight
 from seqsearch.tours.trajectory import Phase, Trajectory
 
 _COLUMNS: Final = 11
+_HEAD: Final = "# MJD x y z vx vy vz m Tx Ty Tz; km, km/s, kg, N; heliocentric ecliptic J2000\n"
 _PHASE: Final = re.compile(r"#\s*phase\s+(\d+)\s*:\s*(\S+)\s*->\s*(\S+)\s*$")
 _MEANT: Final = re.compile(r"#\s*phase\s+\d")
 _UNITS: Final = np.array([1.0, *[1e3] * 6, *[1.0] * 4])
