@@ -128,9 +128,12 @@ def _thrust(flight: Flight) -> list[list[list[float]]]:
 
 
 def _mass(flight: Flight) -> list[list[float]]:
-    """Return epochs and masses in kg; what is left behind shows as a step between legs."""
+    """Return epochs and masses in kg; what is left behind shows as a step at the arrival."""
     line = []
-    for leg, phase in zip(flight.tour.legs, flight.trajectory.phases, strict=True):
+    phases = flight.trajectory.phases
+    after = [float(phase.mass_kg[0]) for phase in phases[1:]]
+    after.append(float(phases[-1].mass_kg[-1]) - flight.tour.legs[-1].dropped_kg)
+    for phase, left_kg in zip(phases, after, strict=True):
         every = np.unique(
             np.linspace(0, len(phase) - 1, min(len(phase), _POINTS_A_LEG)).astype(np.intp)
         )
@@ -140,7 +143,7 @@ def _mass(flight: Flight) -> list[list[float]]:
                 phase.t_mjd2000[every].tolist(), phase.mass_kg[every].tolist(), strict=True
             )
         ]
-        line.append([round(leg.t_arr_mjd2000, 3), round(leg.m_final_kg - leg.dropped_kg, 4)])
+        line.append([round(float(phase.t_mjd2000[-1]), 3), round(left_kg, 4)])
     return line
 
 

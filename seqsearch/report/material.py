@@ -9,10 +9,11 @@ from pathlib import Path
 from typing import Any, Final, final
 
 from feasibility.errors import InputError
-from seqsearch.runs.fleet import is_fleet
-from seqsearch.runs.flights import flight_of
-from seqsearch.runs.run_folder import AUDIT, CANDIDATES, CONFIG, COUNTERS, PROVENANCE, SEQUENCE
+from seqsearch.runs.flights import flight_of, tour_file
+from seqsearch.runs.run_folder import AUDIT, CANDIDATES, CONFIG, COUNTERS, PROVENANCE
+from seqsearch.tours.as_flown import as_flown
 from seqsearch.tours.export.protocol import Flight
+from seqsearch.tours.paths import impulsive_trajectory
 from seqsearch.tours.tour import Tour
 from seqsearch.tours.tour_files import read_tour
 
@@ -54,7 +55,9 @@ class Material:
     Attributes
     ----------
     tour : Tour
-        The best tour.
+        The best tour, with the epochs and masses of the rows.
+    note : str
+        Why the rows beside the tour were not used; empty where there are none, or they were.
     flight : Flight or None
         With its rows; None where it has no leg yet.
     ranks : tuple of RankLine
@@ -71,6 +74,7 @@ class Material:
 
     tour: Tour
     flight: Flight | None
+    note: str
     ranks: tuple[RankLine, ...]
     candidates: tuple[CandidateLine, ...]
     audit: dict[str, Any]
@@ -86,21 +90,30 @@ def gather(path: Path) -> Material:
     InputError
         No tour, a fleet's folder, or a file that is damaged.
     """
-    if path.is_dir() and is_fleet(path):
-        raise InputError(f"{path}: a fleet, expected the folder of one probe, such as probe-1")
-    tour = read_tour(path / SEQUENCE if path.is_dir() else path)
-    flight = flight_of(path) if tour.legs else None
+    tour = read_tour(tour_file(path))
+    flight, note = _flight(path, tour)
     # A tour file of its own says nothing of a search, whatever lies beside it.
     folder = path if path.is_dir() else None
     return Material(
-        tour=tour,
+        tour=tour if flight is None else as_flown(flight),
         flight=flight,
+        note=note,
         ranks=tuple(_ranks(folder)),
         candidates=_thinned(list(_candidates(folder))),
         audit=_json(folder, AUDIT),
         config=_text(folder, CONFIG),
         provenance=_json(folder, PROVENANCE),
     )
+
+
+def _flight(path: Path, tour: Tour) -> tuple[Flight | None, str]:
+    """Return the flight of a tour and a note; the page shows impulses where rows are stale."""
+    if not tour.legs:
+        return None, ""
+    try:
+        return flight_of(path), ""
+    except InputError as error:
+        return Flight(tour, impulsive_trajectory(tour)), str(error)
 
 
 def _text(folder: Path | None, name: str) -> str:

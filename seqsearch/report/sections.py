@@ -55,6 +55,8 @@ def headline(material: Material) -> str:
     if tour.legs:
         first, last = tour.legs[0].t_dep_mjd2000, tour.legs[-1].t_arr_mjd2000
         facts.insert(1, f"{date_of(first)} to {date_of(last)}")
+    if material.note:
+        facts.append(f"the rows beside it are not shown: {material.note}")
     items = "".join(f"<li>{text(fact)}</li>" for fact in facts)
     return f'<h1>{text(tour.rules.name)}</h1><ul class="facts">{items}</ul>'
 

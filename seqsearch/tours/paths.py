@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from feasibility.constants import DAY_S
 from feasibility.errors import InputError
 from feasibility.orbits.classical import classical_to_cartesian, perifocal_axes
-from seqsearch.tours.events.launch import Launch
+from seqsearch.tours.labels import body_label
 from seqsearch.tours.motion import body_state
 from seqsearch.tours.records import TourBody, TourLeg
 from seqsearch.tours.tour import Tour
@@ -55,14 +55,6 @@ def _elements(body: TourBody) -> NDArray[np.float64]:
     return np.array(
         [body.a_m, body.e, body.i_rad, body.node_rad, body.argp_rad, body.mean_anomaly_rad]
     )
-
-
-def body_label(tour: Tour, body_id: int) -> str:
-    """Return what files to hand in call a body: its id, or ``EARTH`` for a launch planet."""
-    for event in tour.rules.events:
-        if isinstance(event, Launch) and event.planet is not None and event.planet.id == body_id:
-            return event.planet.name.upper().replace(" ", "_")
-    return str(body_id)
 
 
 def epochs_between(begin: float, end: float, step_days: float) -> NDArray[np.float64]:

@@ -6,7 +6,7 @@ in all of them are those of the table of legs, 0 for the start.
 
 import warnings
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -27,7 +27,7 @@ _BLUE, _ORANGE, _GREEN, _GREY = "#0072b2", "#e69f00", "#009e73", "#767676"
 """Of Okabe and Ito's palette, which the colour-blind tell apart."""
 
 _LONGEST_NAME: Final = 20
-_STYLE: Final = {
+_STYLE: Final[dict[Any, Any]] = {
     "font.size": 8.0,
     "axes.linewidth": 0.6,
     "axes.spines.top": False,
@@ -100,11 +100,11 @@ def plot_path(tour: Tour, axes: "Axes") -> None:
         axes.plot(track[:, 0], track[:, 1], color=colour, linewidth=1.7, zorder=2)
     mu = tour.rules.mu_m3_s2
     for stop in stops(tour):
-        at = body_states(stop.body, [stop.t_mjd2000], mu)[0, :2] / AU
-        axes.plot(*at, "o", color="black", markersize=2.8, zorder=4)
-        outwards = at / max(float(np.linalg.norm(at)), 1e-9) * 9.0
+        x, y = (body_states(stop.body, [stop.t_mjd2000], mu)[0, :2] / AU).tolist()
+        axes.plot(x, y, "o", color="black", markersize=2.8, zorder=4)
+        outwards = 9.0 / max(float(np.hypot(x, y)), 1e-9)
         axes.annotate(
-            str(stop.number), at, xytext=tuple(outwards), textcoords="offset points",
+            str(stop.number), (x, y), xytext=(outwards * x, outwards * y), textcoords="offset points",
             ha="center", va="center", fontsize=8, fontweight="bold", zorder=5,
         )  # fmt: skip
         if stop.stay_days:
@@ -194,11 +194,12 @@ def plot_mass(tour: Tour, axes: "Axes") -> None:
 
 def _dates(axes: "Axes") -> None:
     """Label the axis of time with calendar dates."""
-    from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
+    from matplotlib import dates
 
-    locator = AutoDateLocator(minticks=4, maxticks=9)
+    untyped: Any = dates
+    locator = untyped.AutoDateLocator(minticks=4, maxticks=9)
     axes.xaxis.set_major_locator(locator)
-    axes.xaxis.set_major_formatter(ConciseDateFormatter(locator))
+    axes.xaxis.set_major_formatter(untyped.ConciseDateFormatter(locator))
 
 
 def _short(name: str) -> str:

@@ -10,8 +10,10 @@ from seqsearch.beam.counters import RankCounters
 from seqsearch.pruning.audit_estimate import AuditedHop, RankAudit, Stratum
 from seqsearch.runs.run_folder import RunFolder
 from seqsearch.tours.motion import body_state
+from seqsearch.tours.paths import body_states
 from seqsearch.tours.records import Impulse, TourBody, TourLeg
 from seqsearch.tours.tour import TourRules
+from seqsearch.tours.trajectory import Phase, Trajectory
 
 _THRUST, _ISP, _SEGMENTS = 0.3, 3000.0, 10
 
@@ -109,3 +111,19 @@ def handmade_run(folder, tour=None, ranks=4):
     run = RunFolder.create(folder, config, 7)
     run.write(tour, counters)
     return folder
+
+
+def handmade_rows(tour, later_days=0.0):
+    """Return rows of continuous thrust that fit in with a tour, though nothing could fly them.
+
+    Arrivals are later than in the tour, as after refining.
+    """
+    phases = []
+    for leg in tour.legs:
+        t = np.linspace(leg.t_dep_mjd2000, leg.t_arr_mjd2000 + later_days, int(leg.tof_days) + 2)
+        states = body_states(tour.body(leg.from_id), t, MU_SUN)
+        thrust = np.zeros((len(t), 3))
+        thrust[3:-3] = 0.2 * states[3:-3, 3:] / np.linalg.norm(states[3:-3, 3:], axis=1)[:, None]
+        mass = np.linspace(leg.m0_kg, leg.m_final_kg + 1.0, len(t))
+        phases.append(Phase(str(leg.from_id), str(leg.to_id), t, states, mass, thrust))
+    return Trajectory(tuple(phases), continuous=True)

@@ -1,6 +1,6 @@
 """``json``: bodies, legs and rows as one JSON document, with a published schema.
 
-The schema is ``trajectory.schema.json`` beside this file; `schema` returns it.
+The schema is ``flight.schema.json`` beside this file; `schema` returns it.
 """
 
 import json
@@ -12,12 +12,13 @@ import numpy as np
 
 from feasibility.constants import AU, MJD2000_MJD
 from feasibility.runtime.atomic import write_text
+from seqsearch.tours.as_flown import as_flown
 from seqsearch.tours.dates import date_of
 from seqsearch.tours.export.arcs import Arc, mission_arcs, words
 from seqsearch.tours.export.protocol import Flight
 from seqsearch.tours.records import TourBody
 
-FORMAT: Final = "seqsearch-trajectory-1"
+FORMAT: Final = "seqsearch-flight-1"
 """Name and version of the layout."""
 
 COLUMNS: Final = (
@@ -46,7 +47,7 @@ class JsonExporter:
 
 def schema() -> dict[str, Any]:
     """Return the JSON schema (draft 2020-12) of the documents."""
-    text = resources.files(__package__).joinpath("trajectory.schema.json")
+    text = resources.files(__package__).joinpath("flight.schema.json")
     record: dict[str, Any] = json.loads(text.read_text(encoding="utf-8"))
     return record
 
@@ -59,7 +60,7 @@ def document(flight: Flight) -> dict[str, Any]:
     InputError
         The trajectory has another number of phases than the tour has legs.
     """
-    tour = flight.tour
+    tour = as_flown(flight)
     arcs = mission_arcs(flight)
     return {
         "format": FORMAT,

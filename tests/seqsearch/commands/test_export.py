@@ -5,8 +5,9 @@ import pytest
 
 from feasibility.runtime.atomic import write_text
 from seqsearch.commands.cli import main
-from seqsearch.tours.tour_files import to_json
-from tests.helpers.handmade_tours import handmade_tour
+from seqsearch.tours.tour_files import read_tour, to_json
+from seqsearch.tours.trajectory_files import write_trajectory
+from tests.helpers.handmade_tours import handmade_rows, handmade_tour
 from tests.helpers.problem_texts import QUICK
 
 
@@ -43,6 +44,18 @@ def test_what_cannot_be_exported_is_said_in_one_line(tour_file, tmp_path, capsys
     write_text(tour_file, to_json(handmade_tour(names=("Alone",))))
     _fails(["export", tour_file, "--to", "csv", "--out", out], capsys, "no leg", str(tour_file))
     assert not out.exists()
+
+
+def test_a_refined_tour_is_exported_with_its_thrust(tour_file, tmp_path, capsys):
+    tour = read_tour(tour_file)
+    write_trajectory(tmp_path, tour, handmade_rows(tour), {})
+    out = tmp_path / "out"
+    for kind in ("rows", "csv", "oem", "json"):
+        assert main(["export", str(tmp_path), "--to", kind, "--out", str(out)]) == 0
+        assert "continuous thrust" in capsys.readouterr().out
+    assert out.read_text().count("continuous thrust") == 1
+    write_text(tour_file, to_json(handmade_tour(tof_days=130.0)))
+    _fails(["export", tour_file, "--to", "csv", "--out", out], capsys, "another tour")
 
 
 def test_the_search_tree_is_a_graph(tmp_path, capsys):

@@ -13,7 +13,8 @@ from seqsearch.report import write_report
 from seqsearch.report.drawings import drawings
 from seqsearch.report.material import gather
 from seqsearch.tours.tour_files import to_json
-from tests.helpers.handmade_tours import handmade_run, handmade_tour
+from seqsearch.tours.trajectory_files import write_trajectory
+from tests.helpers.handmade_tours import handmade_rows, handmade_run, handmade_tour
 
 EVIL = "<script>window.hacked = 1</script>\"'&</pre><img src=x onerror=alert(1)>\u2028"
 
@@ -139,6 +140,7 @@ def _material(tour):
     return Material(
         tour=tour,
         flight=Flight(tour, impulsive_trajectory(tour)),
+        note="",
         ranks=(),
         candidates=(),
         audit={},
@@ -173,3 +175,26 @@ def test_the_command_writes_into_the_run_folder(tmp_path, capsys):
     assert "report.html" in capsys.readouterr().out
     assert main(["report", str(tmp_path / "nothing")]) == 2
     assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_a_refined_tour_is_shown_as_its_rows_fly_it(tmp_path):
+    tour = handmade_tour()
+    run = handmade_run(tmp_path / "run", tour)
+    trajectory = handmade_rows(tour, later_days=1.5)
+    write_trajectory(run, tour, trajectory, {})
+    material = gather(run)
+    assert material.flight.trajectory.continuous
+    record = drawings(material)
+    for visit, leg, phase in zip(record["visits"], tour.legs, trajectory.phases, strict=True):
+        assert visit["arrival"] == round(float(phase.t_mjd2000[-1]), 3)
+        assert visit["arrival"] == pytest.approx(leg.t_arr_mjd2000 + 1.5, abs=1e-3)
+    words = " ".join(_Elements(_page(run, tmp_path)).words)
+    assert "refined to continuous thrust" in words
+    assert f"{trajectory.phases[0].mass_kg[-1]:.2f}" in words
+
+    # Rows of another tour are not shown, and the page says why.
+    other = handmade_tour(tof_days=130.0)
+    write_text(run / "sequence.json", to_json(other))
+    words = " ".join(_Elements(_page(run, tmp_path)).words)
+    assert "not refined" in words
+    assert "refined from another tour" in words
