@@ -98,13 +98,16 @@ def main() -> None:
         start = time.perf_counter()
         write_mpcorb(path, options.bodies, np.random.default_rng(options.seed))
         size = path.stat().st_size / 1e6
-        print(f"{options.bodies} bodies, {size:.0f} MB, written in {time.perf_counter() - start:.0f} s")
+        print(
+            f"{options.bodies} bodies, {size:.0f} MB, written in {time.perf_counter() - start:.0f} s"
+        )
         cache = Path(folder) / "cache"
+        print(f"select: {SELECT}")
         print(f"{'':<34}{'s':>8}{'MiB':>8}{'bodies':>10}")
         for what, select in (
             ("read, and written to the cache", ""),
             ("from the cache", ""),
-            (f"from the cache, {SELECT}"[:33], SELECT),
+            ("from the cache, those selected", SELECT),
         ):
             seconds, peak, bodies = timed(path, cache, select)
             print(f"{what:<34}{seconds:>8}{peak:>8}{bodies:>10}")

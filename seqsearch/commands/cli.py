@@ -9,8 +9,9 @@ from typing import Final
 from feasibility import InputError, MissingDependencyError
 from feasibility.runtime.interrupts import interrupt_code, interruptible
 from feasibility.runtime.terminal import end_output
+from feasibility.runtime.warning_lines import warnings_as_lines
 from feasibility.sims_flanagan.fast.compilation import prefer_fast_compilation
-from seqsearch.commands import plot, polish, problems, resume, run, verify
+from seqsearch.commands import bodies, plot, polish, problems, resume, run, verify
 from seqsearch.commands.options import set_output
 
 _DESCRIPTION: Final = """\
@@ -25,9 +26,10 @@ Sims-Flanagan model.
   seqsearch resume runs/demo              go on after an interruption
   seqsearch polish runs/demo              improve its tour
   seqsearch verify runs/demo              check the result independently
+  seqsearch bodies MPCORB.DAT             what is in an asteroid table
 """
 
-_COMMANDS: Final = (run, resume, polish, verify, plot, problems)
+_COMMANDS: Final = (run, resume, polish, verify, plot, problems, bodies)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -39,7 +41,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     prefer_fast_compilation()
     parsed = _parser().parse_args(arguments)
     set_output(parsed)
-    with interruptible():
+    with interruptible(), warnings_as_lines("seqsearch"):
         try:
             return int(parsed.run(parsed))
         except (InputError, MissingDependencyError) as error:
