@@ -12,6 +12,7 @@ from feasibility.runtime.terminal import end_output
 from feasibility.runtime.warning_lines import warnings_as_lines
 from feasibility.sims_flanagan.fast.compilation import prefer_fast_compilation
 from seqsearch.commands import (
+    bodies,
     export,
     plot,
     polish,
@@ -39,9 +40,21 @@ Sims-Flanagan model.
   seqsearch verify runs/demo              check the result independently
   seqsearch report runs/demo              look at it in a browser
   seqsearch export runs/demo --to csv --out tour.csv
+  seqsearch bodies MPCORB.DAT             what is in an asteroid table
 """
 
-_COMMANDS: Final = (run, resume, polish, refine, verify, plot, report, export, problems)
+_COMMANDS: Final = (
+    run,
+    resume,
+    polish,
+    refine,
+    verify,
+    plot,
+    report,
+    export,
+    problems,
+    bodies,
+)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
