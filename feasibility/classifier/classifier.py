@@ -31,7 +31,9 @@ class FeasibilityClassifier:
     spacecraft. A model with the paper's features was trained for one engine;
     as only thrust over mass enters the motion, a leg with another thrust is
     asked about with its mass in proportion, and another specific impulse is
-    outside its domain.
+    outside its domain. Legs with free ends (`Legs.free_ends`) are outside the domain of every
+    model so far: their probability is 0.5, their margin and final mass are NaN, and
+    `ClassifierPruner` keeps them.
 
     Parameters
     ----------

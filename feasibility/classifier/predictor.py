@@ -91,7 +91,12 @@ def lambert_final_mass(legs: Legs) -> NDArray[np.float64]:
     (n,) float64, kg
         At least the dry mass.
     """
-    delta_v = lambert_delta_v(legs.rv_dep, legs.rv_arr, legs.tof_s, max_revs=0)
+    delta_v = lambert_delta_v(
+        *(legs.rv_dep, legs.rv_arr, legs.tof_s),
+        max_revs=0,
+        vinf_dep=legs.vinf_dep,
+        vinf_arr=legs.vinf_arr,
+    )
     burnt = legs.m0 * -np.expm1(-delta_v / legs.exhaust_velocity)
     most = legs.thrust / legs.exhaust_velocity * legs.tof_s
     estimate: NDArray[np.float64] = np.maximum(legs.m0 - np.minimum(burnt, most), legs.m_dry)

@@ -52,9 +52,15 @@ COLUMNS: Final = (
         "lambert_dv_m_s",
         "float64",
         "m/s",
-        "velocity change of the best Lambert branch in tof_days; NaN where there is none",
+        "velocity change of the best Lambert branch in tof_days beyond the excess velocities; "
+        "NaN where there is none",
     ),
-    Column("m_star_kg", "float64", "kg", "maximum initial mass; NaN where not found or not asked"),
+    Column(
+        "m_star_kg",
+        "float64",
+        "kg",
+        "maximum initial mass; inf where no thrust is needed, NaN where not found or not asked",
+    ),
     Column("log_margin", "float64", "", "log(m_star_kg / m0_kg); the leg is flyable where >= 0"),
     Column(
         "m_final_kg",
@@ -71,5 +77,10 @@ COLUMNS: Final = (
     Column("start", "int16", "", "which start of the solver won, -1 where none"),
     Column("seconds", "float64", "s", "processor time of the solvers"),
     Column("boundary_draw", "bool", "", "whether m0_kg was drawn again near m_star_kg"),
+    Column("vinf_dep_m_s", "float64", "m/s", "largest excess velocity at departure; may be inf"),
+    Column("vinf_arr_m_s", "float64", "m/s", "largest excess velocity at arrival; may be inf"),
 )
 """All columns, in the order of the files."""
+
+ADDED: Final = ("vinf_dep_m_s", "vinf_arr_m_s")
+"""The last columns: files of older versions have none of them, which means zeros."""

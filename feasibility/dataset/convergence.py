@@ -6,6 +6,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from feasibility.errors import InputError
 from feasibility.legs import Legs
 from feasibility.sims_flanagan.pykep_leg import N_SEGMENTS, confirm, scaled_leg
 from feasibility.sims_flanagan.reference.pygmo_problems import MinimumPropellantProblem
@@ -39,9 +40,13 @@ def converge_from_random_start(legs: Legs, rng: np.random.Generator) -> LegSolut
 
     Raises
     ------
+    InputError
+        A leg has free ends, which the paper's problem does not know.
     MissingDependencyError
         pykep or pygmo is not installed.
     """
+    if legs.free_ends.any():
+        raise InputError("label convergence: a leg has free ends, expected label margin")
     n = len(legs)
     found = LegSolutions.unsolved(n, N_SEGMENTS)
     draws = rng.random((n, 3 * N_SEGMENTS + 1))

@@ -59,6 +59,8 @@ class Dataset:
             t_dep_mjd2000=columns["t_dep_mjd2000"],
             dep_id=columns["dep_id"],
             arr_id=columns["arr_id"],
+            vinf_dep=columns["vinf_dep_m_s"],
+            vinf_arr=columns["vinf_arr_m_s"],
         )
 
     @property
@@ -66,7 +68,8 @@ class Dataset:
         """(n,) where the label is known: m* was found, or any row of a convergence label."""
         if self.metadata["protocol"]["label"] == "convergence":
             return np.ones(len(self), dtype=np.bool_)
-        known: NDArray[np.bool_] = np.isfinite(self.columns["log_margin"])
+        # inf is a label: such a leg needs no thrust.
+        known: NDArray[np.bool_] = ~np.isnan(self.columns["log_margin"])
         return known
 
     @property
@@ -92,6 +95,22 @@ class Dataset:
             self.columns["status"] != Status.BELOW_DRY_MASS
         )
         return feasible
+
+    def check_rendezvous(self, what: str) -> None:
+        """Raise InputError where a leg has free ends, of which `what` knows nothing.
+
+        Raises
+        ------
+        InputError
+            A largest excess velocity is above zero.
+        """
+        free = self.legs.free_ends
+        if free.any():
+            name = self.metadata["protocol"]["name"]
+            raise InputError(
+                f"{what}: {free.sum()} legs of protocol {name} have free ends (vinf_dep or "
+                "vinf_arr), expected legs from rest to rest"
+            )
 
     def take(self, rows: ArrayLike) -> "Dataset":
         """Return the rows given as indices or as a mask."""

@@ -114,7 +114,14 @@ def make_shard(task: ShardTask) -> Columns:
     else:
         labels = _margin_labels(draw, protocol, chosen, log_ratio)
     legs: Legs = labels.pop("legs")
-    delta_v = lambert_delta_v(legs.rv_dep, legs.rv_arr, legs.tof_s, LAMBERT_REVOLUTIONS)
+    delta_v = lambert_delta_v(
+        legs.rv_dep,
+        legs.rv_arr,
+        legs.tof_s,
+        LAMBERT_REVOLUTIONS,
+        vinf_dep=legs.vinf_dep,
+        vinf_arr=legs.vinf_arr,
+    )
     return {
         **_leg_columns(legs, task),
         "dt_imp_days": draw.dt_imp_days,
@@ -181,6 +188,8 @@ def _at_boundary(
         t_dep_mjd2000=legs.t_dep_mjd2000,
         dep_id=legs.dep_id,
         arr_id=legs.arr_id,
+        vinf_dep=legs.vinf_dep,
+        vinf_arr=legs.vinf_arr,
     )
     return moved, redrawn
 
@@ -218,6 +227,8 @@ def _leg_columns(legs: Legs, task: ShardTask) -> Columns:
         "thrust_n": legs.thrust,
         "isp_s": legs.isp,
         "m_dry_kg": legs.m_dry,
+        "vinf_dep_m_s": legs.vinf_dep,
+        "vinf_arr_m_s": legs.vinf_arr,
     }
     for state, names in ((legs.rv_dep, DEPARTURE_STATE), (legs.rv_arr, ARRIVAL_STATE)):
         columns |= {column.name: state[:, k] for k, column in enumerate(names)}

@@ -11,7 +11,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.dataset.columns import COLUMNS
+from feasibility.dataset.columns import ADDED, COLUMNS
 from feasibility.errors import InputError, MissingDependencyError
 from feasibility.runtime.atomic import atomic_path, write_json
 
@@ -97,6 +97,7 @@ def read_shard(path: Path, rows: int, *, checksums: bool = False) -> dict[str, N
         columns = {
             column.name: table.column(column.name).to_numpy().astype(column.dtype)
             for column in COLUMNS
+            if column.name in table.column_names
         }
     except InputError:
         raise
@@ -110,12 +111,12 @@ def read_shard(path: Path, rows: int, *, checksums: bool = False) -> dict[str, N
             f"{path}: does not match its checksum: damaged or changed; remove the file, and "
             "feasibility generate with the same settings makes it again"
         )
-    return columns
+    return columns | {name: np.zeros(rows) for name in ADDED if name not in columns}
 
 
 def _check_shape(path: Path, names: list[str], found: int, rows: int) -> None:
     expected = [column.name for column in COLUMNS]
-    if names != expected:
+    if names not in (expected, expected[: -len(ADDED)]):
         other = sorted(set(expected) ^ set(names))
         raise InputError(f"{path}: other columns than expected ({', '.join(other) or 'order'})")
     if found != rows:
@@ -126,6 +127,8 @@ def _shard_digest(path: Path, columns: Mapping[str, NDArray[Any]]) -> str:
     """Return the checksum of a shard: of its name, so that shards cannot be swapped, and rows."""
     digest = hashlib.sha256(path.name.encode())
     for column in COLUMNS:
+        if column.name not in columns:
+            continue
         values = np.ascontiguousarray(columns[column.name])
         digest.update(f"{column.name} {values.dtype.str} {len(values)}".encode())
         digest.update(values.tobytes())

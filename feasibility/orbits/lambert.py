@@ -71,7 +71,14 @@ def lambert(
 
 
 def lambert_delta_v(
-    rv_dep: ArrayLike, rv_arr: ArrayLike, tof_s: ArrayLike, max_revs: int = 2, mu: float = MU_SUN
+    rv_dep: ArrayLike,
+    rv_arr: ArrayLike,
+    tof_s: ArrayLike,
+    max_revs: int = 2,
+    mu: float = MU_SUN,
+    *,
+    vinf_dep: ArrayLike = 0.0,
+    vinf_arr: ArrayLike = 0.0,
 ) -> NDArray[np.float64]:
     """Return the least sum of both impulses over all branches.
 
@@ -88,6 +95,9 @@ def lambert_delta_v(
         Largest number of complete revolutions.
     mu : float
         Gravitational parameter in m3/s2.
+    vinf_dep, vinf_arr : array_like
+        (n,) m/s, or one value: how much of each impulse costs nothing, the largest excess
+        velocities; inf for all of it.
 
     Returns
     -------
@@ -99,15 +109,78 @@ def lambert_delta_v(
     InputError
         The shapes do not fit, or `max_revs` is negative.
     """
+    costs = _arcs(rv_dep, rv_arr, tof_s, max_revs, mu, vinf_dep, vinf_arr)[-1]
+    least: NDArray[np.float64] = costs.min(axis=1)
+    return least
+
+
+def with_lambert_excess(
+    rv_dep: ArrayLike,
+    rv_arr: ArrayLike,
+    tof_s: ArrayLike,
+    vinf_dep: ArrayLike,
+    vinf_arr: ArrayLike,
+    max_revs: int = 2,
+    mu: float = MU_SUN,
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Return end states with the excess of the cheapest Lambert arc, cut to its bounds.
+
+    Parameters
+    ----------
+    rv_dep, rv_arr, tof_s, vinf_dep, vinf_arr, max_revs, mu
+        As for `lambert_delta_v`.
+
+    Returns
+    -------
+    rv_dep, rv_arr : (n, 6) float64, m and m/s
+        End states, mirrored where the departure orbit is retrograde.
+    rest : (n,) float64, m/s
+        What is left of both impulses; inf where no branch exists, and the states are the bodies'.
+    """
+    start, end, v1, v2, rest = _arcs(rv_dep, rv_arr, tof_s, max_revs, mu, vinf_dep, vinf_arr)
+    rows = np.arange(len(start))
+    best = rest.argmin(axis=1)
+    least = rest[rows, best]
+    states = start.copy(), end.copy()
+    for state, v, bound in zip(states, (v1, v2), (vinf_dep, vinf_arr), strict=True):
+        excess = v[rows, best] - state[:, 3:]
+        size = np.linalg.norm(excess, axis=1)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            share = np.where(size > bound, bound / size, 1.0)
+        known = np.isfinite(least)
+        state[known, 3:] += (share[:, None] * excess)[known]
+    return states[0], states[1], least
+
+
+def _arcs(
+    rv_dep: ArrayLike,
+    rv_arr: ArrayLike,
+    tof_s: ArrayLike,
+    max_revs: int,
+    mu: float,
+    vinf_dep: ArrayLike,
+    vinf_arr: ArrayLike,
+) -> tuple[NDArray[np.float64], ...]:
+    """Return both states, the arcs' velocities (n, b, 3), and (n, b) what they cost; inf if none.
+
+    The states are those of prograde departures.
+    """
     start, end = _vectors("rv_dep", rv_dep, 6), _vectors("rv_arr", rv_arr, 6)
     times = np.full(len(start), tof_s) if np.ndim(tof_s) == 0 else tof_s
     if len(start) == len(end):
         start, end = along_departure(start, off_singular(start, end))
     v1, v2 = lambert(start[:, :3], end[:, :3], times, max_revs, mu)
-    impulses = np.linalg.norm(v1 - start[:, None, 3:], axis=2)
-    impulses += np.linalg.norm(end[:, None, 3:] - v2, axis=2)
-    least: NDArray[np.float64] = np.where(np.isnan(impulses), np.inf, impulses).min(axis=1)
-    return least
+    impulses = _beyond(np.linalg.norm(v1 - start[:, None, 3:], axis=2), vinf_dep)
+    impulses += _beyond(np.linalg.norm(end[:, None, 3:] - v2, axis=2), vinf_arr)
+    return start, end, v1, v2, np.where(np.isnan(impulses), np.inf, impulses)
+
+
+def _beyond(impulses: NDArray[np.float64], bound: ArrayLike) -> NDArray[np.float64]:
+    """Return by how much impulses (n, b) exceed bounds (n,), or one."""
+    if not np.any(bound):
+        return impulses
+    limit = np.asarray(bound, dtype=np.float64).reshape(-1, 1)
+    return np.maximum(impulses - limit, 0.0)
 
 
 def _vectors(name: str, value: ArrayLike, size: int) -> NDArray[np.float64]:

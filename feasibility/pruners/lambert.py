@@ -30,6 +30,10 @@ class LambertPruner:
     orbit, and the turn out of it costs nothing: such legs are rather kept. So are those exactly
     at 0 degrees, of which Lambert's arcs say nothing.
 
+    Free ends: the excess velocities take over what they can of each impulse, and the arc of which
+    least is left counts. Near a coasted departure orbit, after a whole number of turns, Lambert's
+    arcs say little of fly-bys, and flyable ones are lost.
+
     Parameters
     ----------
     factor : float
@@ -68,7 +72,14 @@ class LambertPruner:
     def keep(self, legs: Legs, /) -> NDArray[np.bool_]:
         """Return (n,) bool, True where the leg survives."""
         rv_arr = levelled_targets(legs.rv_dep, legs.rv_arr, legs.tof_s, MU_SUN)
-        needed = lambert_delta_v(legs.rv_dep, rv_arr, legs.tof_s, self.max_revs)
+        needed = lambert_delta_v(
+            legs.rv_dep,
+            rv_arr,
+            legs.tof_s,
+            self.max_revs,
+            vinf_dep=legs.vinf_dep,
+            vinf_arr=legs.vinf_arr,
+        )
         burnt = legs.thrust * legs.tof_s / (legs.exhaust_velocity * legs.m0)
         available = np.full(len(legs), np.inf)
         limited = burnt < 1.0

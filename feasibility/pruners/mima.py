@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from feasibility.constants import MU_SUN
 from feasibility.errors import InputError
 from feasibility.legs import Legs
+from feasibility.orbits.lambert import with_lambert_excess
 from feasibility.orbits.mima import mima, mima2
 from feasibility.orbits.transfer_plane import in_line, levelled_targets
 
@@ -29,14 +30,27 @@ class _LargestMassPruner(ABC):
             raise InputError(f"{kind} max_revs: {self.max_revs}, expected zero or more")
 
     @abstractmethod
-    def _largest_mass(self, legs: Legs, rv_arr: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the estimate, (n,) kg, for the arrival states `rv_arr`."""
+    def _largest_mass(
+        self, legs: Legs, rv_dep: NDArray[np.float64], rv_arr: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Return the estimate, (n,) kg, for the end states `rv_dep` and `rv_arr`."""
 
     def keep(self, legs: Legs, /) -> NDArray[np.bool_]:
         """Return (n,) bool, True where the leg survives."""
+        rv_dep = legs.rv_dep
         rv_arr = levelled_targets(legs.rv_dep, legs.rv_arr, legs.tof_s, MU_SUN)
-        enough = self._largest_mass(legs, rv_arr) >= self.margin * legs.m0
-        return enough | in_line(legs.rv_dep, legs.rv_arr)
+        thrustless = np.zeros(len(legs), dtype=np.bool_)
+        free = np.flatnonzero(legs.free_ends)
+        if len(free):
+            rv_dep, rv_arr = rv_dep.copy(), rv_arr.copy()
+            some = legs.take(free)
+            rv_dep[free], rv_arr[free], rest = with_lambert_excess(
+                *(some.rv_dep, rv_arr[free], some.tof_s, some.vinf_dep, some.vinf_arr),
+                max_revs=self.max_revs,
+            )
+            thrustless[free] = rest == 0.0
+        enough = self._largest_mass(legs, rv_dep, rv_arr) >= self.margin * legs.m0
+        return enough | thrustless | in_line(legs.rv_dep, legs.rv_arr)
 
 
 @final
@@ -64,6 +78,10 @@ class MimaPruner(_LargestMassPruner):
     through both positions misleads, the plane of the departure orbit is taken and the turn
     out of it neglected: such legs are rather kept, and always exactly at 0 degrees.
 
+    The closed forms know no free ends. A leg with them is judged as the leg that begins and ends
+    with the excess velocities of the Lambert arc of which least is left, cut to their bounds; one
+    of which nothing is left is kept.
+
     Examples
     --------
     >>> MimaPruner(margin=0.95).name
@@ -75,10 +93,10 @@ class MimaPruner(_LargestMassPruner):
         """Name in counters and reports."""
         return "mima"
 
-    def _largest_mass(self, legs: Legs, rv_arr: NDArray[np.float64]) -> NDArray[np.float64]:
-        return mima(
-            legs.rv_dep, rv_arr, legs.tof_s, legs.thrust, legs.exhaust_velocity, self.max_revs
-        )
+    def _largest_mass(
+        self, legs: Legs, rv_dep: NDArray[np.float64], rv_arr: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        return mima(rv_dep, rv_arr, legs.tof_s, legs.thrust, legs.exhaust_velocity, self.max_revs)
 
 
 @final
@@ -99,7 +117,7 @@ class Mima2Pruner(_LargestMassPruner):
         """Name in counters and reports."""
         return "mima2"
 
-    def _largest_mass(self, legs: Legs, rv_arr: NDArray[np.float64]) -> NDArray[np.float64]:
-        return mima2(
-            legs.rv_dep, rv_arr, legs.tof_s, legs.thrust, legs.exhaust_velocity, self.max_revs
-        )
+    def _largest_mass(
+        self, legs: Legs, rv_dep: NDArray[np.float64], rv_arr: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        return mima2(rv_dep, rv_arr, legs.tof_s, legs.thrust, legs.exhaust_velocity, self.max_revs)

@@ -89,6 +89,7 @@ class StudyData:
                 f"dataset of protocol {protocol['name']}: its label is {protocol['label']!r}, "
                 "expected 'margin'; the study computes the paper's own label itself"
             )
+        dataset.check_rendezvous("study")
         rows = dataset.take(np.flatnonzero(dataset.labelled))
         X = paper_features(
             rows.legs,

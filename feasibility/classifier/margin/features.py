@@ -86,14 +86,15 @@ def margin_features(legs: Legs) -> tuple[_Array, _Array]:
     X : (n, 80) float64
         `FEATURES`; NaN where an orbit is no ellipse or no hint exists.
     hint : (n,) float64
-        Estimate of `log_acceleration` at the maximum initial mass.
+        Estimate of `log_acceleration` at the maximum initial mass; NaN also for legs with free
+        ends.
     """
     from feasibility.classifier.margin import feature_kernels
 
     X = np.empty((len(legs), feature_kernels.N_FEATURES))
     hint = np.empty(len(legs))
     feature_kernels.feature_batch(*_arguments(legs), X, hint)
-    return X, hint
+    return X, _of_rendezvous(legs, hint)
 
 
 def quick_features(legs: Legs) -> tuple[_Array, _Array]:
@@ -103,7 +104,13 @@ def quick_features(legs: Legs) -> tuple[_Array, _Array]:
     X = np.empty((len(legs), feature_kernels.N_QUICK))
     hint = np.empty(len(legs))
     feature_kernels.quick_batch(*_arguments(legs), X, hint)
-    return X, hint
+    return X, _of_rendezvous(legs, hint)
+
+
+def _of_rendezvous(legs: Legs, hint: _Array) -> _Array:
+    """Return the hints, NaN for legs with free ends: the features know nothing of these."""
+    free = legs.free_ends
+    return np.where(free, np.nan, hint) if free.any() else hint
 
 
 def log_acceleration(legs: Legs, mass: _Array) -> _Array:

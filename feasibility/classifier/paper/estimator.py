@@ -59,7 +59,8 @@ class PaperEstimator:
         """Return (n,) the probabilities of feasibility and whether the legs are in the domain."""
         probability = np.full(len(legs), _UNKNOWN)
         inside = np.zeros(len(legs), dtype=np.bool_)
-        bound = np.flatnonzero(_bound(legs.rv_dep) & _bound(legs.rv_arr))
+        # The paper's features know nothing of free ends.
+        bound = np.flatnonzero(_bound(legs.rv_dep) & _bound(legs.rv_arr) & ~legs.free_ends)
         for first in range(0, len(bound), _LEGS_AT_A_TIME):
             rows = bound[first : first + _LEGS_AT_A_TIME]
             probability[rows], inside[rows] = self._assess_bound(legs.take(rows))

@@ -4,12 +4,19 @@ from typing import Annotated, ClassVar, final
 
 import msgspec
 import numpy as np
-from msgspec import Meta
+from msgspec import UNSET, Meta, UnsetType
 from numpy.random import Generator
 from numpy.typing import NDArray
 
 from feasibility.constants import AU, DAY_S, MU_SUN, mjd_to_mjd2000
-from feasibility.dataset.samplers.draws import Columns, Draw, check_ranges, collect
+from feasibility.dataset.samplers.draws import (
+    Columns,
+    Draw,
+    check_ranges,
+    collect,
+    log_uniform,
+)
+from feasibility.dataset.samplers.free_ends import FreeEnds
 from feasibility.dataset.samplers.impulsive import ImpulsiveGrid
 from feasibility.legs import Legs, Spacecraft
 from feasibility.orbits import Catalogue, cartesian_to_classical, classical_to_cartesian
@@ -69,6 +76,8 @@ class AnySpacecraft(
         Initial mass, log-uniform.
     dry_share : pair of float
         Dry mass over initial mass, uniform.
+    free_ends : FreeEnds, optional
+        Shares of legs with excess velocities at their ends; none unless given.
     """
 
     draws_spacecraft: ClassVar[bool] = True
@@ -88,6 +97,8 @@ class AnySpacecraft(
     isp_s: _Range = (1000.0, 6000.0)
     m0_kg: _Range = (100.0, 5000.0)
     dry_share: _Range = (0.2, 0.8)
+    # Not among the settings unless it is given, as in datasets of before.
+    free_ends: FreeEnds | UnsetType = UNSET
 
     def __post_init__(self) -> None:
         check_ranges(
@@ -127,20 +138,28 @@ class AnySpacecraft(
             return self._orbit_pairs(m, rng, catalogue, usable)
 
         rows = collect(n, batch)
-        m0 = _log_uniform(rng, self.m0_kg, n)
-        thrust = m0 * _log_uniform(rng, self.acceleration_m_s2, n)
+        m0 = log_uniform(rng, self.m0_kg, n)
+        thrust = m0 * log_uniform(rng, self.acceleration_m_s2, n)
         slowest, fastest = self.acceleration_m_s2
+        rv_dep = classical_to_cartesian(rows["departure"])
+        rv_arr = classical_to_cartesian(rows["arrival"])
+        isp = log_uniform(rng, self.isp_s, n)
+        m_dry = m0 * rng.uniform(*self.dry_share, n)
+        ends = FreeEnds() if isinstance(self.free_ends, UnsetType) else self.free_ends
+        vinf_dep, vinf_arr = ends.draw(rng, rv_dep, rv_arr)
         legs = Legs(
-            rv_dep=classical_to_cartesian(rows["departure"]),
-            rv_arr=classical_to_cartesian(rows["arrival"]),
+            rv_dep=rv_dep,
+            rv_arr=rv_arr,
             tof_days=rows["tof"],
             m0=m0,
             thrust=thrust,
-            isp=_log_uniform(rng, self.isp_s, n),
-            m_dry=m0 * rng.uniform(*self.dry_share, n),
+            isp=isp,
+            m_dry=m_dry,
             t_dep_mjd2000=rows["t_dep"],
             dep_id=rows["dep_id"],
             arr_id=np.full(n, -1),
+            vinf_dep=vinf_dep,
+            vinf_arr=vinf_arr,
         )
         return Draw(legs, np.full(n, np.nan), thrust / fastest, thrust / slowest)
 
@@ -161,7 +180,7 @@ class AnySpacecraft(
             departure[known] = cartesian_to_classical(catalogue.states_at(rows, t_dep[known]))
             dep_id[known] = catalogue.ids[rows]
         near = rng.uniform(size=m) < self.near_share
-        size = _log_uniform(rng, self.disturbance, m)
+        size = log_uniform(rng, self.disturbance, m)
         disturbed = _disturbed(departure, size, rng.standard_normal((m, 6)))
         arrival = np.where(near[:, None], disturbed, self._orbits(rng, m))
         smaller = np.minimum(departure[:, 0], arrival[:, 0])
@@ -183,7 +202,7 @@ class AnySpacecraft(
 
     def _orbits(self, rng: Generator, m: int) -> NDArray[np.float64]:
         elements = np.empty((m, 6))
-        elements[:, 0] = AU * _log_uniform(rng, self.a_au, m)
+        elements[:, 0] = AU * log_uniform(rng, self.a_au, m)
         elements[:, 1] = rng.rayleigh(self.eccentricity_scale, m)
         elements[:, 2] = np.radians(rng.rayleigh(self.inclination_scale_deg, m))
         elements[:, 3:] = rng.uniform(0.0, 2.0 * np.pi, (m, 3))
@@ -200,11 +219,6 @@ class AnySpacecraft(
             & (elements[:, 2] < 0.5 * np.pi)
         )
         return within
-
-
-def _log_uniform(rng: Generator, bounds: tuple[float, float], n: int) -> NDArray[np.float64]:
-    low, high = np.log(bounds)
-    return np.exp(rng.uniform(low, high, n))
 
 
 def _disturbed(

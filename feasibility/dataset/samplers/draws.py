@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any, Final, final
 
 import numpy as np
+from numpy.random import Generator
 from numpy.typing import NDArray
 
 from feasibility.errors import InputError
@@ -77,6 +78,12 @@ def collect(n: int, batch: Callable[[int], Columns]) -> Columns:
     return {name: np.concatenate([part[name] for part in parts])[:n] for name in parts[0]}
 
 
+def log_uniform(rng: Generator, bounds: tuple[float, float], n: int) -> NDArray[np.float64]:
+    """Return n numbers whose logarithms are uniform between those of the bounds."""
+    low, high = np.log(bounds)
+    return np.exp(rng.uniform(low, high, n))
+
+
 def check_pairs(catalogue: Catalogue) -> None:
     """Raise InputError where a catalogue has no pair of bodies."""
     if len(catalogue) < 2:
@@ -95,6 +102,8 @@ _MOST: Final = {
     "disturbance": (10.0, ""),
     "revolutions": (100.0, ""),
     "acceleration_m_s2": (0.01, ""),
+    "vinf_km_s": (300.0, "; is it in m/s?"),
+    "excess_of_circular": (10.0, "; is it in km/s?"),
     "isp_s": (2e4, "; is it in m/s, an exhaust velocity?"),
 }
 """Largest numbers of ranges, and what larger ones usually are."""

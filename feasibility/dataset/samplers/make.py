@@ -1,8 +1,9 @@
 """The samplers that a protocol's TOML file knows by name."""
 
 from feasibility.dataset.samplers.any_spacecraft import AnySpacecraft
+from feasibility.dataset.samplers.earth_legs import EarthLegs
 from feasibility.dataset.samplers.random_pairs import RandomPairs
 from feasibility.dataset.samplers.search_candidates import SearchCandidates
 
-NamedSampler = RandomPairs | SearchCandidates | AnySpacecraft
+NamedSampler = RandomPairs | SearchCandidates | AnySpacecraft | EarthLegs
 """What ``kind`` in the table ``[sampler]`` chooses from, each by its struct's tag."""

@@ -58,13 +58,14 @@ class MarginExamples:
         Raises
         ------
         InputError
-            A dataset was not labelled by margin.
+            A dataset was not labelled by margin, or has legs with free ends.
         """
         parts = []
         for dataset, pairs in zip(datasets, pairs_of_bodies(datasets), strict=True):
             label = dataset.metadata["protocol"]["label"]
             if label != "margin":
                 raise InputError(f"margin model: a dataset is labelled by {label}, not by margin")
+            dataset.check_rendezvous("margin model")
             columns = dataset.columns
             legs = dataset.legs
             X, hint = margin_features(legs)

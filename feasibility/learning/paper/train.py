@@ -90,6 +90,7 @@ class Examples:
     @classmethod
     def of(cls, dataset: Dataset) -> "Examples":
         """Compute features and labels (`Dataset.flyable`) of the rows whose label is known."""
+        dataset.check_rendezvous("model with the paper's features")
         rows = np.flatnonzero(dataset.labelled)
         part = dataset.take(rows)
         columns = part.columns
