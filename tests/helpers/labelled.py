@@ -46,6 +46,8 @@ def labelled_dataset(legs: int = 1500, seed: int = 0, bodies: int = 40) -> Datas
         "start": np.zeros(legs),
         "seconds": np.zeros(legs),
         "boundary_draw": np.zeros(legs),
+        "vinf_dep_m_s": np.zeros(legs),
+        "vinf_arr_m_s": np.zeros(legs),
     }
     for state, names in ((flown.rv_dep, DEPARTURE_STATE), (flown.rv_arr, ARRIVAL_STATE)):
         columns |= {column.name: state[:, axis] for axis, column in enumerate(names)}

@@ -48,6 +48,8 @@ def columns(n: int, seed: int = 0) -> dict[str, np.ndarray]:
         "start": rng.integers(0, 5, n),
         "seconds": rng.uniform(0.001, 0.002, n),
         "boundary_draw": rng.uniform(size=n) < 0.3,
+        "vinf_dep_m_s": np.where(rng.uniform(size=n) < 0.5, 2000.0, 0.0),
+        "vinf_arr_m_s": np.where(rng.uniform(size=n) < 0.5, np.inf, 0.0),
     }
     states = {"dep": BELT.states(8000.0)[dep], "arr": BELT.states(8200.0)[arr]}
     for end, state in states.items():
