@@ -214,7 +214,7 @@ def fast_min_propellant(
         seconds[part] = (time.thread_time() - began) / len(part)
     # The start closes the leg, whatever could not be made of it.
     stuck = free & (ratio == 0.0)
-    ratio[stuck] = (guess.m_final[rows] / guess.m0[rows])[stuck]
+    ratio[stuck] = guess.m_final[rows][stuck] / guess.m0[rows][stuck]
     m_final = flyable.m0 * ratio
     found = _confirmed(flyable, throttles, flyable.m0, m_final, start, seconds, excess)
     merged = {name: getattr(solutions, name) for name in LegSolutions.__dataclass_fields__}
