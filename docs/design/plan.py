@@ -29,6 +29,7 @@ FLOORS = {
         {"orbits": "Kepler, elements, Lambert, MIMA, catalogues, neighbours"},
         {"legs": "Legs and Spacecraft, the one thing that all parts exchange"},
         {"runtime": "files, processes, kernels, TOML, the guarded import of pykep"},
+        {"leg_checks": "columns of legs, and units that were probably meant"},
         {"quantities": "numbers that carry units"},
         {"constants": "units", "errors": "InputError", "arrays": "structs of arrays"},
     ],

@@ -278,3 +278,30 @@ def test_numbers_and_single_rows_count_for_every_leg_and_are_copied():
     assert legs.tof_s.tolist() == [400 * DAY_S, 410 * DAY_S]
     assert legs.exhaust_velocity.tolist() == [3000 * G0, 3000 * G0]
     assert len(legs.take([])) == 0
+
+
+def test_ends_are_those_of_a_rendezvous_unless_given_and_travel_with_the_legs():
+    assert not Legs(**GOOD).free_ends.any()
+    legs = Legs(**GOOD, vinf_dep=[0.0, 5.0, 3000.0], vinf_arr=np.inf)
+    np.testing.assert_array_equal(legs.vinf_dep, [0.0, 5.0, 3000.0])
+    np.testing.assert_array_equal(legs.take([2, 1]).vinf_dep, [3000.0, 5.0])
+    both = Legs.concatenate([legs.take([1]), Legs(**GOOD)])
+    np.testing.assert_array_equal(both.vinf_arr, [np.inf, 0.0, 0.0, 0.0])
+    np.testing.assert_array_equal(both.free_ends, [True, False, False, False])
+    assert legs.with_m0(1500.0).vinf_arr[0] == np.inf
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        (-1.0, "row 0: -1 m/s, expected zero or more, or inf"),
+        ([0.0, np.nan, 0.0], "row 1: nan m/s, expected zero or more, or inf"),
+        ([0.0, 0.0, 3.5], "row 2: 3.5 m/s is the largest excess velocity, expected 0, or 20 m/s"),
+        (6.0, "is it in km/s?"),
+        (1e6, "row 0: 1e+06 m/s is beyond 300000 m/s; expected inf for any speed"),
+    ],
+)
+def test_excess_velocities_that_cannot_be_are_refused(values, message):
+    for name in ("vinf_dep", "vinf_arr"):
+        refused(message, **{name: values})
+        refused(f"Legs {name}", **{name: values})

@@ -475,9 +475,7 @@ def free_maximum_batch(
     mass_ratio: _Array,
     excess: _Array,
 ) -> None:
-    """Solve every leg of a batch, SI units; rows without a solution keep z = inf, winner = -1.
-
-    Parameters as for `maximum_batch`, and
+    """Solve every leg of a batch as `maximum_batch` does, with its parameters, and these:
 
     vinf_dep, vinf_arr : (legs,) float64
         Largest excess velocities, at least one of a leg above 0.

@@ -341,3 +341,28 @@ def test_inspect_says_in_one_line_what_it_cannot_read(tmp_path, capsys):
     error = capsys.readouterr().err
     assert error.startswith("feasibility: ")
     assert error.count("\n") == 1
+
+
+def test_a_dataset_of_before_free_ends_is_read_with_zeros(tmp_path, monkeypatch):
+    import feasibility.dataset.storage as storage
+
+    with monkeypatch.context() as old:
+        old.setattr(storage, "COLUMNS", COLUMNS[:-2])
+        write(tmp_path, [20])
+    data = read_dataset(tmp_path)
+    assert len(data) == 20
+    assert not data.legs.free_ends.any()
+
+
+def test_a_leg_without_a_largest_mass_is_labelled_and_flyable():
+    data = dataset(20)
+    columns_ = {
+        **data.columns,
+        "log_margin": np.full(20, np.inf),
+        "m_star_kg": np.full(20, np.inf),
+    }
+    endless = Dataset(columns_, data.metadata)
+    assert endless.labelled.all()
+    assert endless.flyable.all()
+    with pytest.raises(InputError, match="legs of protocol search have free ends"):
+        endless.check_rendezvous("model")

@@ -349,3 +349,37 @@ def test_a_sampler_of_ones_own_makes_a_dataset_that_is_resumed_by_an_equal_one_o
         begin(protocol(RandomPairs(m0_kg=(900.0, 900.0))), 6, tmp_path)
     with pytest.raises(ValueError, match="below dry_mass_kg"):
         protocol(Neighbours(400.0, m0_kg=(400.0, 900.0)))
+
+
+@pytest.mark.parametrize("name", ["launch", "launch-flyby", "arrival", "flyby"])
+def test_protocols_with_free_ends_have_their_ends(name):
+    protocol = read_protocol(name)
+    legs = draw(name, 1).legs
+    again = protocol.sampler.draw(60, np.random.default_rng(1), BELT, None, COARSE).legs
+    np.testing.assert_array_equal(legs.rv_arr, again.rv_arr)
+    assert legs.free_ends.all()
+    launch = name.startswith("launch")
+    assert ((legs.vinf_dep >= 500.0) & (legs.vinf_dep <= 6000.0)).all() == launch
+    fly_by = np.isinf(legs.vinf_arr).mean()
+    assert {"launch": 0.0, "launch-flyby": 1.0, "arrival": 0.0}.get(name, 0.8) == pytest.approx(
+        fly_by, abs=0.2
+    )
+    if name != "flyby":
+        at_earth = legs.rv_dep if launch else legs.rv_arr
+        np.testing.assert_allclose(np.linalg.norm(at_earth[:, :3], axis=1), AU, rtol=0.02)
+
+
+def test_general_has_no_free_ends_and_its_settings_are_those_of_before():
+    assert "free_ends" not in read_protocol("general").to_dict()["sampler"]
+    assert not draw("general", 2).legs.free_ends.any()
+
+
+def test_datasets_with_free_ends_are_made_and_read(tmp_path):
+    protocol = msgspec.structs.replace(
+        read_protocol("flyby"), catalogue=CatalogueTable(synthetic_bodies=50), legs_per_shard=12
+    )
+    begin(protocol, 12, tmp_path).run()
+    data = read_dataset(tmp_path)
+    assert np.isinf(data.legs.vinf_arr).any()
+    assert data.labelled.mean() > 0.8
+    assert (data.columns["boundary_draw"].sum()) > 0

@@ -22,6 +22,7 @@ from feasibility.pruners import (
     check_pruner,
     quick_check,
 )
+from tests.helpers.free_legs import free_legs, with_ends
 
 
 @dataclass(frozen=True)
@@ -239,3 +240,26 @@ def test_all_of_asks_only_about_survivors_and_counts_by_name():
 def test_nonsense_parameters_are_input_errors(wrong):
     with pytest.raises(InputError):
         wrong()
+
+
+def test_legs_with_free_ends_are_judged_with_lambert_s_excess_cut_to_the_bounds():
+    legs = free_legs(40, 1, far=0.2)
+    for pruner in (LambertPruner(), MimaPruner(), Mima2Pruner()):
+        rest = pruner.keep(legs)
+        some = pruner.keep(with_ends(legs, 1000.0, 1000.0))
+        assert (some | ~rest).mean() > 0.9
+        assert pruner.keep(with_ends(legs, np.inf, np.inf)).all()
+        assert some.sum() > rest.sum()
+
+
+def test_the_default_classifier_knows_nothing_of_free_ends_and_says_so():
+    classifier = FeasibilityClassifier.load("default")
+    legs = Legs.concatenate([free_legs(5, 2), free_legs(5, 2, 0.0, np.inf)])
+    np.testing.assert_array_equal(classifier.in_domain(legs)[5:], False)
+    assert np.isnan(classifier.margin(legs)[5:]).all()
+    assert np.isnan(classifier.quick_margin(legs)[5:]).all()
+    assert np.isnan(classifier.final_mass(legs)[5:]).all()
+    np.testing.assert_array_equal(classifier.feasible_probability(legs)[5:], 0.5)
+    assert ClassifierPruner(classifier).keep(legs)[5:].all()
+    alone = classifier.margin(legs.take(np.arange(5)))
+    np.testing.assert_array_equal(classifier.margin(legs)[:5], alone)
