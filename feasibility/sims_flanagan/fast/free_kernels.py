@@ -475,7 +475,7 @@ def free_maximum_batch(
     mass_ratio: _Array,
     excess: _Array,
 ) -> None:
-    """Solve every leg of a batch as `maximum_batch` does, with its parameters, and these:
+    """Solve every leg of a batch as `maximum_batch` does, with its parameters, and with these.
 
     vinf_dep, vinf_arr : (legs,) float64
         Largest excess velocities, at least one of a leg above 0.

@@ -240,7 +240,8 @@ def test_collect_keeps_the_order_of_what_is_accepted():
 
 def test_every_built_in_protocol_reads():
     names = builtin_protocols()
-    assert set(names) == {"table1", "limited", "search", "general", "paper"}
+    ends = {"launch", "launch-flyby", "arrival", "flyby"}
+    assert set(names) == {"table1", "limited", "search", "general", "paper"} | ends
     for name in names:
         assert read_protocol(name).name == name
     assert read_protocol("paper").label == "convergence"
@@ -298,7 +299,7 @@ def test_the_spacecraft_is_given_where_it_is_not_drawn_and_only_there(tmp_path):
 
 
 def test_an_unknown_protocol_lists_the_known_ones():
-    with pytest.raises(InputError, match="built-in protocols are general, limited, paper"):
+    with pytest.raises(InputError, match="built-in protocols are arrival, flyby, general"):
         read_protocol("tabel1")
 
 

@@ -250,16 +250,3 @@ def test_legs_with_free_ends_are_judged_with_lambert_s_excess_cut_to_the_bounds(
         assert (some | ~rest).mean() > 0.9
         assert pruner.keep(with_ends(legs, np.inf, np.inf)).all()
         assert some.sum() > rest.sum()
-
-
-def test_the_default_classifier_knows_nothing_of_free_ends_and_says_so():
-    classifier = FeasibilityClassifier.load("default")
-    legs = Legs.concatenate([free_legs(5, 2), free_legs(5, 2, 0.0, np.inf)])
-    np.testing.assert_array_equal(classifier.in_domain(legs)[5:], False)
-    assert np.isnan(classifier.margin(legs)[5:]).all()
-    assert np.isnan(classifier.quick_margin(legs)[5:]).all()
-    assert np.isnan(classifier.final_mass(legs)[5:]).all()
-    np.testing.assert_array_equal(classifier.feasible_probability(legs)[5:], 0.5)
-    assert ClassifierPruner(classifier).keep(legs)[5:].all()
-    alone = classifier.margin(legs.take(np.arange(5)))
-    np.testing.assert_array_equal(classifier.margin(legs)[:5], alone)
