@@ -114,6 +114,50 @@ def _lay_arc(
             arc[first + i, j] = segments[i, j]
 
 
+@inner_kernel
+def _take_lead(
+    dep: bool, arr: bool, excess: _Array, speed: float, frame: _Array, leads: _Array
+) -> None:
+    """Write the scaled excess velocities (2, 3) of open ends, zero of others.
+
+    Where any velocity is right, that of the start is as good as the body's.
+    """
+    for j in range(3):
+        leads[0, j] = leads[1, j] = 0.0
+        for k in range(3):
+            if dep:
+                leads[0, j] += frame[j, k] * excess[0, k] / speed
+            if arr:
+                leads[1, j] += frame[j, k] * excess[1, k] / speed
+
+
+@inner_kernel
+def _load(
+    first: int,
+    n: int,
+    rows: int,
+    speed: float,
+    frame: _Array,
+    excess: _Array,
+    leads: _Array,
+    dv: _Array,
+    w: Workspace,
+) -> None:
+    """Write the impulses of a start: those in w.n3[STARTS], and its excess beyond `leads`."""
+    for i in range(n):
+        for j in range(3):
+            dv[first + i, j] = w.n3[STARTS, i, j]
+    for j in range(3):
+        if first > 0:
+            dv[0, j] = -leads[0, j]
+            for k in range(3):
+                dv[0, j] += frame[j, k] * excess[0, k] / speed
+        if w.s[FREE, rows - 1] > 0.0:
+            dv[rows - 1, j] = leads[1, j]
+            for k in range(3):
+                dv[rows - 1, j] -= frame[j, k] * excess[1, k] / speed
+
+
 @kernel
 def free_minimum_batch(
     rv0: _Array,
@@ -131,26 +175,12 @@ def free_minimum_batch(
     excess: _Array,
     winner: NDArray[np.int64],
 ) -> None:
-    """Lower the propellant of every leg of a batch, SI units.
+    """Lower the propellant of a batch as `minimum_batch` does, with its parameters and these.
 
-    Parameters
-    ----------
-    rv0, rv1 : (legs, 6) float64
-        End states.
-    tof_s, exhaust, vinf_dep, vinf_arr : (legs,) float64
-        Flight times, exhaust velocities, and largest excess velocities.
-    z : (legs,) float64
-        T dt / (m0 c) at the wanted initial mass.
+    vinf_dep, vinf_arr : (legs,) float64
+        Largest excess velocities.
     light : (legs,) bool
         Where Lambert's arcs are tried as well.
-    n : int
-        Segments.
-    mu : float
-        Gravitational parameter.
-    throttles : (legs, n, 3) float64
-        Holds throttles that close the leg at the wanted initial mass; receives better ones.
-    mass_ratio : (legs,) float64
-        Receives final over initial mass, 0 where the start did not close.
     excess : (legs, 2, 3) float64
         Holds the excess velocities of the start; receives those of the solution.
     winner : (legs,) int64
@@ -170,14 +200,10 @@ def free_minimum_batch(
             mass_ratio[row] = 1.0
             continue
         length, speed = scale_leg(rv0[row], rv1[row], mu, frame, x0, x1)
-        # Where any velocity is right, that of the start is as good as the body's.
+        _take_lead(
+            vinf_dep[row] == np.inf, vinf_arr[row] == np.inf, excess[row], speed, frame, leads
+        )
         for j in range(3):
-            leads[0, j] = leads[1, j] = 0.0
-            for k in range(3):
-                if vinf_dep[row] == np.inf:
-                    leads[0, j] += frame[j, k] * excess[row, 0, k] / speed
-                if vinf_arr[row] == np.inf:
-                    leads[1, j] += frame[j, k] * excess[row, 1, k] / speed
             x0[3 + j] += leads[0, j]
             x1[3 + j] += leads[1, j]
         if not to_elements(x1, target):
@@ -189,20 +215,7 @@ def free_minimum_batch(
         rows, forward = lay_timeline(tof, n, dep, arr, c * z[row], w)
         first = 1 if dep > 0.0 else 0
         read_throttles(throttles[row], z[row], c, n, frame, w.n3[STARTS])
-        for i in range(n):
-            for j in range(3):
-                dv[first + i, j] = w.n3[STARTS, i, j]
-        for j in range(3):
-            if first > 0:
-                dv[0, j] = 0.0
-                for k in range(3):
-                    dv[0, j] += frame[j, k] * excess[row, 0, k] / speed
-                dv[0, j] -= leads[0, j]
-            if arr > 0.0:
-                dv[rows - 1, j] = 0.0
-                for k in range(3):
-                    dv[rows - 1, j] -= frame[j, k] * excess[row, 1, k] / speed
-                dv[rows - 1, j] += leads[1, j]
+        _load(first, n, rows, speed, frame, excess[row], leads, dv, w)
         best = minimise_one(x0, target, c, z[row], rows, forward, dv, w)
         if best < np.inf:
             mass_ratio[row] = _put(
