@@ -10,7 +10,7 @@ from seqsearch.report.material import Material
 from seqsearch.tours.dates import date_of
 from seqsearch.tours.export.protocol import Flight
 from seqsearch.tours.paths import body_states, orbit_points
-from seqsearch.tours.stops import stops
+from seqsearch.tours.pictures.stops import stops
 from seqsearch.tours.tour import Tour
 from seqsearch.tours.trajectory import Phase
 

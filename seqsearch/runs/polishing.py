@@ -23,7 +23,7 @@ from seqsearch.pruning.pruner_spec import parse_pruner, predictor_of
 from seqsearch.runs.checkpoint import FOLDER, Checkpoints, catalogue_digest
 from seqsearch.runs.run_folder import CONFIG, SEQUENCE, RunFolder, worth
 from seqsearch.runs.session import PACKAGES
-from seqsearch.tours.plots import plot_tour
+from seqsearch.tours.pictures.plots import plot_tour
 from seqsearch.tours.tour import Tour
 from seqsearch.tours.tour_files import read_tour
 

@@ -14,7 +14,7 @@ from feasibility.constants import AU
 from feasibility.runtime.atomic import atomic_path
 from seqsearch.tours.dates import date_of
 from seqsearch.tours.paths import body_states, impulsive_trajectory, orbit_points
-from seqsearch.tours.stops import stops
+from seqsearch.tours.pictures.stops import stops
 from seqsearch.tours.tour import Tour
 
 if TYPE_CHECKING:
