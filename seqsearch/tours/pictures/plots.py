@@ -104,8 +104,9 @@ def plot_path(tour: Tour, axes: "Axes") -> None:
         axes.plot(x, y, "o", color="black", markersize=2.8, zorder=4)
         outwards = 9.0 / max(float(np.hypot(x, y)), 1e-9)
         axes.annotate(
-            str(stop.number), (x, y), xytext=(outwards * x, outwards * y), textcoords="offset points",
-            ha="center", va="center", fontsize=8, fontweight="bold", zorder=5,
+            str(stop.number), (x, y), xytext=(outwards * x, outwards * y),
+            textcoords="offset points", ha="center", va="center", fontsize=8,
+            fontweight="bold", zorder=5,
         )  # fmt: skip
         if stop.stay_days:
             days = np.linspace(0.0, stop.stay_days, 12)
