@@ -26,6 +26,9 @@ _MPL_MJD2000: Final = 10957.0
 _BLUE, _ORANGE, _GREEN, _GREY = "#0072b2", "#e69f00", "#009e73", "#767676"
 """Of Okabe and Ito's palette, which the colour-blind tell apart."""
 
+_CROWDED: Final = 0.06
+"""Stops whose distance is less than this share of that from the Sun share a place."""
+
 _LONGEST_NAME: Final = 20
 _STYLE: Final[dict[Any, Any]] = {
     "font.size": 8.0,
@@ -99,10 +102,15 @@ def plot_path(tour: Tour, axes: "Axes") -> None:
         track = phase.states[:, :2] / AU
         axes.plot(track[:, 0], track[:, 1], color=colour, linewidth=1.7, zorder=2)
     mu = tour.rules.mu_m3_s2
+    marked: list[tuple[float, float]] = []
     for stop in stops(tour):
         x, y = (body_states(stop.body, [stop.t_mjd2000], mu)[0, :2] / AU).tolist()
         axes.plot(x, y, "o", color="black", markersize=2.8, zorder=4)
-        outwards = 9.0 / max(float(np.hypot(x, y)), 1e-9)
+        radius = max(float(np.hypot(x, y)), 1e-9)
+        # Where an earlier number stands already, the later one stands further out.
+        crowd = sum(np.hypot(x - a, y - b) < _CROWDED * radius for a, b in marked)
+        marked.append((x, y))
+        outwards = (9.0 + 10.0 * crowd) / radius
         axes.annotate(
             str(stop.number), (x, y), xytext=(outwards * x, outwards * y),
             textcoords="offset points", ha="center", va="center", fontsize=8,
