@@ -51,6 +51,7 @@ from feasibility.orbits.readers.horizons import horizons_table
 from feasibility.orbits.readers.mpcorb import is_mpcorb, mpcorb_rows
 from feasibility.orbits.readers.rows import Row, read_rows, takes_julian_dates
 from feasibility.orbits.readers.text import read_lines
+from feasibility.orbits.spk.files import is_kernel
 
 _NODE_LAST: Final = ("epoch", "a", "e", "i", "argp", "node", "M")
 _KNOWN: Final = {
@@ -96,6 +97,11 @@ def read_catalogue(path: str | PathLike[str]) -> Catalogue:
         names the file, the line and what was expected.
     """
     file = Path(path)
+    if is_kernel(file):
+        # Imported here: tables have no need of it.
+        from feasibility.orbits.spk.reading import read_kernels
+
+        return read_kernels(file)
     lines: Sequence[str] = read_lines(file)
     header = None
     name = None

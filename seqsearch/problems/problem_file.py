@@ -3,7 +3,7 @@
 import re
 from functools import cache
 from pathlib import Path
-from typing import Annotated, Any, Final, final
+from typing import Annotated, Any, Final, Literal, final
 
 import msgspec
 import numpy as np
@@ -13,6 +13,7 @@ from msgspec import Meta
 from feasibility import InputError, Spacecraft
 from feasibility.constants import mjd_to_mjd2000
 from feasibility.orbits import Catalogue, read_catalogue, synthetic_main_belt
+from feasibility.orbits.spk.files import is_kernel
 from feasibility.runtime.toml_file import convert_table, parse_toml, read_toml_text
 from seqsearch.core.problem import Problem
 from seqsearch.problems.registry import ProblemPlugin, builtin_problems, plugins
@@ -79,13 +80,17 @@ class MissionTable(_Table, frozen=True, kw_only=True):
 class CatalogueTable(_Table, frozen=True, kw_only=True):
     """Table ``[catalogue]``: a file, or a synthetic belt, or neither (then --catalogue).
 
-    Bodies in `exclude_ids` are left out.
+    Bodies in `exclude_ids` are left out. Where the file is an SPK kernel, a folder of them or a
+    meta-kernel, `bodies` says which of its bodies are meant (default: all small bodies and
+    spacecraft), and `ephemeris` whether they move on Kepler orbits or as the kernels say.
     """
 
     file: str | None = None
     synthetic_bodies: Annotated[int, Meta(ge=2)] | None = None
     synthetic_seed: Annotated[int, Meta(ge=0)] = 0
     exclude_ids: tuple[int, ...] = ()
+    bodies: tuple[int | str, ...] = ()
+    ephemeris: Literal["kepler", "spk"] = "kepler"
 
 
 @final
@@ -219,7 +224,9 @@ def override(config: Config, **changes: Any) -> Config:
 
 def with_catalogue(config: Config, file: str) -> Config:
     """Return the configuration with another catalogue file, less the same bodies."""
-    table = CatalogueTable(file=file, exclude_ids=config.catalogue.exclude_ids)
+    table = msgspec.structs.replace(
+        config.catalogue, file=file, synthetic_bodies=None, synthetic_seed=0
+    )
     return msgspec.structs.replace(config, catalogue=table)
 
 
@@ -246,7 +253,7 @@ def build_problem(config: Config, catalogue: Catalogue | None = None) -> Problem
     earliest, latest = mission.first_departure_mjd
     base = RendezvousProblem(
         name=config.problem.name,
-        catalogue=_without_excluded(catalogue or _whole_catalogue(config), config),
+        catalogue=_without_excluded(catalogue or whole_catalogue(config), config),
         spacecraft=Spacecraft(craft.dry_mass_kg, craft.thrust_n, craft.isp_s),
         m0=craft.wet_mass_kg,
         first_departure_mjd2000=(mjd_to_mjd2000(earliest), mjd_to_mjd2000(latest)),
@@ -264,7 +271,13 @@ def build_problem(config: Config, catalogue: Catalogue | None = None) -> Problem
         )
     for plugin, rules in own:
         if plugin.build is not None:
-            return plugin.build(base, rules)
+            problem = plugin.build(base, rules)
+            if base.catalogue.ephemeris is not None and problem.catalogue.ephemeris is None:
+                raise InputError(
+                    f"problem {base.name}: [{plugin.name}] has bodies of its own on Kepler "
+                    'orbits; expected [catalogue] ephemeris = "kepler"'
+                )
+            return problem
     return base
 
 
@@ -312,8 +325,8 @@ def table_at_hand(config: Config) -> Catalogue | None:
         It is there, but cannot be read.
     """
     file = config.catalogue.file
-    there = config.catalogue.synthetic_bodies if file is None else Path(file).is_file()
-    return _whole_catalogue(config) if there else None
+    there = config.catalogue.synthetic_bodies if file is None else Path(file).exists()
+    return whole_catalogue(config) if there else None
 
 
 def _without_excluded(catalogue: Catalogue, config: Config) -> Catalogue:
@@ -322,12 +335,27 @@ def _without_excluded(catalogue: Catalogue, config: Config) -> Catalogue:
     return catalogue.select(kept) if len(excluded) else catalogue
 
 
-def _whole_catalogue(config: Config) -> Catalogue:
+def whole_catalogue(config: Config) -> Catalogue:
+    """Return the catalogue that a configuration names, with the bodies that it excludes.
+
+    Raises
+    ------
+    InputError
+        There is none, or it cannot be read.
+    """
     table = config.catalogue
     if table.file is not None and table.synthetic_bodies is not None:
         raise InputError(
             f"problem {config.problem.name}: [catalogue] has both file and synthetic_bodies, "
             "expected one of them"
+        )
+    if table.file is not None and is_kernel(Path(table.file)):
+        return _kernel_bodies(config, Path(table.file))
+    if table.bodies or table.ephemeris == "spk":
+        key = "bodies" if table.bodies else 'ephemeris = "spk"'
+        raise InputError(
+            f"problem {config.problem.name}: [catalogue] has {key}, expected file to be an SPK "
+            f"kernel, a folder of them or a meta-kernel, got {table.file or 'none'}"
         )
     if table.file is not None:
         return read_catalogue(Path(table.file))
@@ -337,6 +365,19 @@ def _whole_catalogue(config: Config) -> Catalogue:
     raise InputError(
         f"problem {config.problem.name}: no asteroid table; give one with --catalogue FILE "
         "(the README says where the official tables are)"
+    )
+
+
+def _kernel_bodies(config: Config, path: Path) -> Catalogue:
+    # Imported here: other problems have no need of SPICE.
+    from feasibility.orbits.spk.reading import read_kernels
+
+    earliest, latest = (mjd_to_mjd2000(epoch) for epoch in config.mission.first_departure_mjd)
+    return read_kernels(
+        path,
+        config.catalogue.bodies,
+        config.catalogue.ephemeris,
+        (earliest, latest + config.mission.max_duration_days),
     )
 
 

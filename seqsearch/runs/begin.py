@@ -6,6 +6,7 @@ from typing import Final
 import numpy as np
 
 from feasibility.constants import YEAR_DAYS
+from feasibility.orbits.spk.kepler_error import motion_line
 from feasibility.runtime.locks import folder_lock
 from feasibility.runtime.terminal import Level, say
 from seqsearch.beam.state import SearchState
@@ -55,6 +56,8 @@ def begin_search(config: Config, path: Path, seed: int, limits: Limits) -> int:
             Level.PROGRESS,
         )
         say(_window_line(problem), Level.PROGRESS)
+        if motion := motion_line(problem.catalogue):
+            say(motion, Level.PROGRESS)
         return run_session(
             folder,
             checkpoints,

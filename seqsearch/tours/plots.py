@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from feasibility.constants import AU, DAY_S, MJD2000_MJD
 from feasibility.runtime.atomic import atomic_path
-from seqsearch.tours.motion import body_state
+from seqsearch.tours.motion import arrival_state, body_state, departure_state
 from seqsearch.tours.records import TourLeg
 from seqsearch.tours.tour import Tour
 
@@ -50,15 +50,26 @@ def _draw_path(axes: "Axes", tour: Tour) -> None:
     for leg in tour.legs:
         track = _track(tour, leg) / AU
         axes.plot(track[:, 0], track[:, 1], linewidth=1.2)
-    stops = [tour.legs[0].t_dep_mjd2000] if tour.legs else [tour.t_start_mjd2000]
-    stops += [leg.t_arr_mjd2000 for leg in tour.legs if not leg.is_fly_by]
-    for k, (body, epoch) in enumerate(zip(tour.bodies, stops, strict=False)):
-        x, y = body_state(body, epoch, tour.rules.mu_m3_s2)[:2] / AU
+    for k, (x, y) in enumerate(_stops(tour)):
         axes.plot(x, y, "ko", markersize=3)
         axes.annotate(str(k), (x, y), xytext=(4, 4), textcoords="offset points", fontsize=7)
     axes.plot(0, 0, "o", color="gold", markeredgecolor="k")
     axes.set(aspect="equal", xlabel="x, AU (ecliptic J2000)", ylabel="y, AU")
     axes.set_title("visits in order, 0 is the start", fontsize=9)
+
+
+def _stops(tour: Tour) -> NDArray[np.float64]:
+    """Return (s, 2) where the tour stops in the ecliptic, in AU."""
+    mu = tour.rules.mu_m3_s2
+    if not tour.legs:
+        states = [body_state(body, tour.t_start_mjd2000, mu) for body in tour.bodies[:1]]
+    else:
+        first = tour.legs[0]
+        states = [departure_state(first, tour.body(first.from_id), mu)]
+        states += [
+            arrival_state(leg, tour.body(leg.to_id), mu) for leg in tour.legs if not leg.is_fly_by
+        ]
+    return np.array(states).reshape(-1, 6)[:, :2] / AU
 
 
 def _draw_mass(axes: "Axes", tour: Tour) -> None:
@@ -84,7 +95,7 @@ def _track(tour: Tour, leg: TourLeg) -> NDArray[np.float64]:
     from feasibility.orbits.kepler_kernels import propagate_batch
 
     mu = tour.rules.mu_m3_s2
-    state = body_state(tour.body(leg.from_id), leg.t_dep_mjd2000, mu)
+    state = departure_state(leg, tour.body(leg.from_id), mu)
     state[3:] += leg.dep_velocity_m_s
     epochs = [leg.t_dep_mjd2000, *(i.t_mjd2000 for i in leg.impulses), leg.t_arr_mjd2000]
     impulses = [*(np.asarray(impulse.dv_m_s) for impulse in leg.impulses), np.zeros(3)]
