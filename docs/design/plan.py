@@ -15,7 +15,7 @@ FLOORS = {
         {"problems": "one folder a problem, found by entry points; problem files"},
         {"pruning": "pruners by name, pruning of hops, the audit"},
         {"core": "the words: problem contract, nodes, hops, candidates, tree"},
-        {"tours": "what is found: record, files, events, scores, verify, plot"},
+        {"tours": "what is found: record, files, verify, plot", "fetching": "JPL, MPC"},
         {"settings": "[search]", "budget": "when to stop", "deadline": "the clock"},
     ],
     "feasibility": [

@@ -10,7 +10,7 @@ from feasibility import InputError, MissingDependencyError
 from feasibility.runtime.interrupts import interrupt_code, interruptible
 from feasibility.runtime.terminal import end_output
 from feasibility.sims_flanagan.fast.compilation import prefer_fast_compilation
-from seqsearch.commands import plot, polish, problems, resume, run, verify
+from seqsearch.commands import fetch, plot, polish, problems, resume, run, verify
 from seqsearch.commands.options import set_output
 
 _DESCRIPTION: Final = """\
@@ -25,9 +25,10 @@ Sims-Flanagan model.
   seqsearch resume runs/demo              go on after an interruption
   seqsearch polish runs/demo              improve its tour
   seqsearch verify runs/demo              check the result independently
+  seqsearch fetch mpcorb                  bodies from those who publish them
 """
 
-_COMMANDS: Final = (run, resume, polish, verify, plot, problems)
+_COMMANDS: Final = (run, resume, polish, verify, plot, problems, fetch)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
