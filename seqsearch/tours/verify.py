@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from feasibility.constants import AU
 from feasibility.errors import InputError
+from seqsearch.tours.bodies.kernel_states import kernel_states, missing_kernels
 from seqsearch.tours.checks import (
     SPEED_TOLERANCE_M_S,
     TIME_TOLERANCE_DAYS,
@@ -28,7 +29,6 @@ from seqsearch.tours.checks import (
     smallest,
 )
 from seqsearch.tours.events.make import event_kinds
-from seqsearch.tours.kernel_states import kernel_states, missing_kernels
 from seqsearch.tours.model_checks import check_masses, check_thrust
 from seqsearch.tours.motion import (
     arrival_state,

@@ -83,8 +83,8 @@ class BodyCoverage:
         if around(self.intervals, window) is None:
             raise InputError(self._apart(window))
 
-    def needs_some_of(self, window: Interval) -> str | None:
-        """Return a warning where a window is covered in part, and refuse one that is not at all.
+    def needs_some_of(self, window: Interval) -> tuple[str, ...]:
+        """Return a note where a window is covered in part, and refuse one that is not at all.
 
         Raises
         ------
@@ -92,16 +92,19 @@ class BodyCoverage:
             Nothing of it is covered.
         """
         if around(self.intervals, window) is not None:
-            return None
+            return ()
         if not within(self.intervals, window):
             raise InputError(self._apart(window))
-        return self._apart(window)
+        return (self._words(window),)
 
     def _apart(self, window: Interval) -> str:
+        return f"{self.path}: {self._words(window)}"
+
+    def _words(self, window: Interval) -> str:
         have = self.calendar.spans(self.intervals)
         gap = "with gaps " if len(self.intervals) > 1 else ""
         where = "" if self.files == (self.path.name,) else f" by {', '.join(self.files)}"
         return (
-            f"{self.path}: {self.label} is covered{where} {gap}from {have}, but the mission is "
+            f"{self.label} is covered{where} {gap}from {have}, but the mission is "
             f"from {self.calendar.spans([window])}"
         )

@@ -63,7 +63,7 @@ def motion_line(catalogue: Catalogue) -> str | None:
     if catalogue.ephemeris is not None:
         return f"bodies move as the kernels say; Kepler orbits would be up to {size}"
     epoch = Calendar().text(seconds_of(float(np.median(catalogue.epoch_mjd2000))))
-    line = f"bodies move on Kepler orbits of {epoch}, over the mission up to {size}"
+    line = f"bodies move on Kepler orbits of {epoch}, against the kernels up to {size}"
     if error_km[worst] > _FAR_KM:
         line += '; [catalogue] ephemeris = "spk" moves them as the kernels say'
     return line

@@ -58,6 +58,26 @@ class _Body:
     pieces: tuple[Piece, ...]
 
 
+@final
+@dataclass(frozen=True, eq=False)
+class KernelReading:
+    """What was read from kernels.
+
+    Attributes
+    ----------
+    catalogue : Catalogue
+        The bodies.
+    away : tuple of str
+        Bodies that are left out, as they are on no ellipse about the Sun.
+    notes : tuple of str
+        What users should know.
+    """
+
+    catalogue: Catalogue
+    away: tuple[str, ...]
+    notes: tuple[str, ...]
+
+
 def read_kernels(
     path: str | PathLike[str],
     bodies: Sequence[int | str] = (),
@@ -94,13 +114,49 @@ def read_kernels(
         the kernels do not cover the window: all of it for ``"spk"``, some of it for ``"kepler"``.
         The message is one line that names file, body, coverage and window.
     """
+    reading = kernel_reading(path, bodies, ephemeris, window_mjd2000)
+    for note in reading.notes:
+        warnings.warn(f"{path}: {note}", stacklevel=2)
+    if reading.away:
+        warnings.warn(f"{path}: {_left_out(reading)}", stacklevel=2)
+    return reading.catalogue
+
+
+def _left_out(reading: KernelReading) -> str:
+    away = reading.away
+    return (
+        f"{len(away)} of {len(reading.catalogue) + len(away)} bodies are on no ellipse about the "
+        f"Sun and are left out: {', '.join(away[:3])}{' ...' if len(away) > 3 else ''}"
+    )
+
+
+def kernel_reading(
+    path: str | PathLike[str],
+    bodies: Sequence[int | str] = (),
+    ephemeris: EphemerisKind = "kepler",
+    window_mjd2000: tuple[float, float] | None = None,
+) -> KernelReading:
+    """Return what `read_kernels` does, with what it has to say of it.
+
+    Parameters
+    ----------
+    path, bodies, ephemeris, window_mjd2000
+        As for `read_kernels`.
+
+    Raises
+    ------
+    InputError
+        As for `read_kernels`.
+    """
     if ephemeris == "spk" and window_mjd2000 is None:
         raise InputError(f'{path}: ephemeris = "spk" needs the window of a mission')
     files = kernel_files(Path(path))
     motion = Motion(read_segments(files.spk))
     calendar = Calendar.read(files.leap_seconds)
     window = None if window_mjd2000 is None else _window(window_mjd2000)
-    found, away = [], []
+    found: list[_Body] = []
+    away: list[str] = []
+    notes: list[str] = []
     with motion.reading() as states:
         for number in chosen_bodies(files.path, bodies, motion.bodies):
             pieces = motion.pieces(number)
@@ -111,12 +167,24 @@ def read_kernels(
                 files.path, label, motion.files_of(number), tuple(coverage(pieces)), calendar
             )
             body = _read_body(number, pieces, covered, states, window, ephemeris)
+            if window is not None and ephemeris == "kepler":
+                notes += covered.needs_some_of(window)
             if body is None:
                 away.append(label)
             else:
                 found.append(body)
-    _warn(files.path, found, away)
-    return _catalogue(files.path, found, ephemeris)
+    if not found:
+        raise InputError(
+            f"{files.path}: {', '.join(away[:3])}: on no ellipse about the Sun, expected a body "
+            "that is"
+        )
+    notes += [
+        f"{_label(body.number)} has jumps in its kernel; its table is off by up to "
+        f"{body.fit.worst_m:.3g} m there"
+        for body in found
+        if body.fit is not None and body.fit.worst_m > _WORST_M
+    ]
+    return KernelReading(_catalogue(files.path, found, ephemeris), tuple(away), tuple(notes))
 
 
 def _window(window_mjd2000: tuple[float, float]) -> Interval:
@@ -140,8 +208,8 @@ def _read_body(
     intervals = covered.intervals
     if window is not None and ephemeris == "spk":
         covered.needs_all_of(window)
-    elif window is not None and (warning := covered.needs_some_of(window)) is not None:
-        warnings.warn(warning, stacklevel=3)
+    elif window is not None:
+        covered.needs_some_of(window)
     span = (intervals[0][0], intervals[-1][1]) if window is None else window
     epoch = nearest(intervals, (span[0] + span[1]) / 2.0)
     if window is None:
@@ -178,26 +246,6 @@ def _table(pieces: Sequence[Piece], states: States, span: Interval) -> Fit:
         np.concatenate([part.coefficients for part in fits]),
         max(part.worst_m for part in fits),
     )
-
-
-def _warn(path: Path, found: Sequence[_Body], away: Sequence[str]) -> None:
-    """Tell which bodies are left out, and which are followed badly."""
-    some = f"{', '.join(away[:3])}{' ...' if len(away) > 3 else ''}"
-    if not found:
-        raise InputError(f"{path}: {some}: on no ellipse about the Sun, expected a body that is")
-    if away:
-        warnings.warn(
-            f"{path}: {len(away)} of {len(found) + len(away)} bodies are on no ellipse about the "
-            f"Sun and are left out: {some}",
-            stacklevel=3,
-        )
-    for body in found:
-        if body.fit is not None and body.fit.worst_m > _WORST_M:
-            warnings.warn(
-                f"{path}: {_label(body.number)} has jumps in its kernel; its table is off by up "
-                f"to {body.fit.worst_m:.3g} m there",
-                stacklevel=3,
-            )
 
 
 def _catalogue(path: Path, bodies: Sequence[_Body], ephemeris: EphemerisKind) -> Catalogue:

@@ -5,7 +5,7 @@ Sun is reached.
 """
 
 import hashlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any, Final, final
@@ -16,7 +16,9 @@ from numpy.typing import NDArray
 from feasibility.constants import DAY_S
 from feasibility.errors import InputError
 from feasibility.runtime.spice import opened, spice
-from seqsearch.tours.records import KernelFile
+from seqsearch.tours.motion import body_state
+from seqsearch.tours.records import KernelFile, TourBody
+from seqsearch.tours.tour import TourRules
 
 _SUN: Final = 10
 _BARYCENTRE: Final = 0
@@ -105,3 +107,29 @@ def kernel_states(files: Sequence[Path]) -> Iterator[KernelStates]:
 def _sha256(file: Path) -> str:
     with file.open("rb") as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+BodyState = Callable[[TourBody, float], NDArray[np.float64]]
+"""The (6,) state of a body at an epoch in MJD2000, m and m/s."""
+
+
+@contextmanager
+def states_by_rules(rules: TourRules, kernels: Sequence[Path]) -> Iterator[BodyState]:
+    """Yield where bodies are by the rules of a problem: on Kepler orbits, or as kernels say.
+
+    Raises
+    ------
+    InputError
+        The rules name kernels that are not at hand, or that cannot be read.
+    """
+    if not rules.kernels:
+        yield lambda body, t_mjd2000: body_state(body, t_mjd2000, rules.mu_m3_s2)
+        return
+    missing = missing_kernels(rules.kernels, kernels)
+    if missing:
+        raise InputError(
+            f"the bodies of {rules.name} move as kernels say that are missing or changed: "
+            f"{', '.join(missing)}; expected these very files, without which nothing is checked"
+        )
+    with kernel_states(kernels) as states:
+        yield lambda body, t_mjd2000: states(body.id, t_mjd2000)
