@@ -1,5 +1,6 @@
 """SPK kernels that tests write with spiceypy."""
 
+import functools
 from collections.abc import Callable
 from pathlib import Path
 
@@ -7,16 +8,20 @@ import numpy as np
 import spiceypy
 from numpy.typing import NDArray
 
-from feasibility.constants import DAY_S
-from feasibility.orbits import Catalogue, synthetic_main_belt
+from feasibility.constants import AU, DAY_S
+from feasibility.orbits import Catalogue
 
 States = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 """(k,) MJD2000 to (k, 6) heliocentric ecliptic states, m and m/s."""
 
 
+@functools.cache
 def belt(bodies: int = 12, seed: int = 5) -> Catalogue:
-    """Return the bodies whose motion the kernels have."""
-    return synthetic_main_belt(bodies, np.random.default_rng(seed))
+    """Return the bodies whose motion the kernels have: a family, so that legs can be flown."""
+    rng = np.random.default_rng(seed)
+    spread = rng.uniform(-1.0, 1.0, (bodies, 6)) * [0.01 * AU, 0.01, 0.01, 0.02, 0.02, 0.05]
+    elements = np.array([2.4 * AU, 0.05, 0.05, 1.0, 2.0, 3.0]) + spread
+    return Catalogue(range(1, bodies + 1), ["family"] * bodies, 11000.0, elements, "family")
 
 
 def kepler_states(row: int, push_m: float = 0.0) -> States:
