@@ -136,7 +136,10 @@ def test_elements_osculate_in_the_middle_of_the_window(kernel):
 
 
 def test_without_a_mission_elements_osculate_in_the_middle_of_the_coverage(kernel):
-    catalogue = read_catalogue(kernel)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        catalogue = read_catalogue(kernel, select=f"id < {FIRST + 2}")
+    assert catalogue.ids.tolist() == [FIRST, FIRST + 1]
     assert catalogue.epoch_mjd2000 == pytest.approx((START + END) / 2)
     assert catalogue.extra["covered_from_mjd"] == pytest.approx(START + 51544)
     assert catalogue.extra["covered_to_mjd"] == pytest.approx(END + 51544)
