@@ -16,7 +16,7 @@ FLOORS = {
         {"problems": "one folder a problem, found by entry points; problem files"},
         {"pruning": "pruners by name, pruning of hops, the audit"},
         {"core": "the words: problem contract, nodes, hops, candidates, tree"},
-        {"tours": "what is found: record, files, exports, events, scores, verify, plots"},
+        {"tours": "what is found: record, files, verify, plots", "fetching": "JPL, MPC"},
         {"settings": "[search]", "budget": "when to stop", "deadline": "the clock"},
     ],
     "feasibility": [

@@ -1,4 +1,4 @@
-"""`Catalogue`: many bodies on Kepler orbits, and where they are at any epoch."""
+"""`Catalogue`: many bodies, and where they are at any epoch: on Kepler orbits, or as told."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -12,13 +12,16 @@ from numpy.typing import ArrayLike, NDArray
 from feasibility.constants import DAY_S, MU_SUN
 from feasibility.errors import InputError
 from feasibility.orbits.classical import perifocal_axes
+from feasibility.orbits.spk.kernel_table import KernelTable
 from feasibility.runtime.text_column import TextColumn, taken_texts
 
 
 @final
 @dataclass(frozen=True, eq=False, repr=False)
 class Catalogue:
-    """Bodies in heliocentric two-body motion, one row a body.
+    """Bodies in heliocentric motion, one row a body.
+
+    An `feasibility.orbits.spk.Ephemeris` of two-body motion, unless another one is given.
 
     With n the number of bodies. Arrays are copied once, validated once and
     made read-only.
@@ -40,6 +43,8 @@ class Catalogue:
     extra : mapping of str to array_like, optional
         (n,) float64 each: further numeric columns of the table by name, in its units; values
         may be NaN. Motion does not depend on them.
+    ephemeris : KernelTable, optional
+        How the bodies move instead of by their elements, which then osculate.
 
     Raises
     ------
@@ -62,6 +67,7 @@ class Catalogue:
     elements: NDArray[np.float64]
     source: str
     extra: Mapping[str, NDArray[np.float64]]
+    ephemeris: KernelTable | None
 
     def __init__(
         self,
@@ -71,6 +77,7 @@ class Catalogue:
         elements: ArrayLike,
         source: str,
         extra: Mapping[str, ArrayLike] | None = None,
+        ephemeris: KernelTable | None = None,
     ) -> None:
         id_column = _integers("Catalogue ids", ids)
         element_rows = np.array(elements, dtype=np.float64)
@@ -90,6 +97,8 @@ class Catalogue:
                 f"Catalogue epoch_mjd2000: expected shape ({n},) or one value, got {epochs.shape}"
             )
         epochs = np.broadcast_to(epochs, (n,)).copy()
+        if ephemeris is not None and len(ephemeris) != n:
+            raise InputError(f"Catalogue ephemeris: has {len(ephemeris)} bodies, expected {n}")
         _check_orbits(epochs, element_rows)
         _check_distinct(id_column)
         columns = {name: _extra_column(name, column, n) for name, column in (extra or {}).items()}
@@ -102,6 +111,7 @@ class Catalogue:
         object.__setattr__(self, "elements", element_rows)
         object.__setattr__(self, "source", source)
         object.__setattr__(self, "extra", MappingProxyType(columns))
+        object.__setattr__(self, "ephemeris", ephemeris)
 
     def __len__(self) -> int:
         return len(self.ids)
@@ -209,6 +219,8 @@ class Catalogue:
         from feasibility.orbits.catalogue_kernels import propagate_rows
 
         index, epochs = self.checked_queries(rows, t_mjd2000)
+        if self.ephemeris is not None:
+            return self.ephemeris.states_at(index, epochs)
         states: NDArray[np.float64] = propagate_rows(self._orbits, index, epochs)
         return states
 
@@ -258,6 +270,7 @@ class Catalogue:
             elements=self.elements[index],
             source=self.source,
             extra={name: column[index] for name, column in self.extra.items()},
+            ephemeris=None if self.ephemeris is None else self.ephemeris.select(index),
         )
 
     def _checked_rows(self, rows: ArrayLike) -> NDArray[np.int64]:

@@ -14,6 +14,7 @@ from feasibility.sims_flanagan.fast.compilation import prefer_fast_compilation
 from seqsearch.commands import (
     bodies,
     export,
+    fetch,
     plot,
     polish,
     problems,
@@ -41,6 +42,7 @@ Sims-Flanagan model.
   seqsearch report runs/demo              look at it in a browser
   seqsearch export runs/demo --to csv --out tour.csv
   seqsearch bodies MPCORB.DAT             what is in an asteroid table
+  seqsearch fetch mpcorb                  bodies from those who publish them
 """
 
 _COMMANDS: Final = (
@@ -54,6 +56,7 @@ _COMMANDS: Final = (
     export,
     problems,
     bodies,
+    fetch,
 )
 
 

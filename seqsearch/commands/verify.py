@@ -9,7 +9,6 @@ from feasibility.runtime.terminal import say, say_json
 from seqsearch.commands.options import add_output, sequence_path
 
 if TYPE_CHECKING:
-    from feasibility.orbits import Catalogue
     from seqsearch.commands.options import Commands
     from seqsearch.problems.problem_file import Config
     from seqsearch.tours.checks import Verification
@@ -23,7 +22,9 @@ and what the problem's rules allow besides: launch, fly-bys, masses left behind,
 The rules come from the problem, not from the file under test: from the run's config.toml,
 or from --problem. A tour that keeps only the rules in its own file is not verified. With
 the asteroid table at hand (--catalogue, or where config.toml says) bodies are compared with
-it. Exit code 0 if everything holds, else 1.
+it. Where bodies move as SPK kernels say, arrivals are checked against SPICE itself, with the
+very files of the run (--catalogue, or where config.toml says). Exit code 0 if everything holds,
+else 1.
 """
 
 
@@ -50,18 +51,16 @@ def add_parser(commands: "Commands") -> None:
 
 
 def _verify(options: argparse.Namespace) -> int:
-    from feasibility.orbits import read_catalogue
     from seqsearch.runs.fleet import check_disjoint, is_fleet, probe_paths
     from seqsearch.tours.checks import Verification
     from seqsearch.tours.tour_files import read_tour
 
     path = Path(options.path)
-    catalogue = None if options.catalogue is None else read_catalogue(Path(options.catalogue))
     fleet = is_fleet(path)
     paths = probe_paths(path) if fleet else [sequence_path(options.path)]
     tours = [read_tour(file) for file in paths]
     outcomes = [
-        _verified(file, tour, options.problem, catalogue)
+        _verified(file, tour, options.problem, options.catalogue)
         for file, tour in zip(paths, tours, strict=True)
     ]
     if fleet:
@@ -78,17 +77,19 @@ def _verify(options: argparse.Namespace) -> int:
 
 
 def _verified(
-    file: Path, tour: "Tour", problem: str | None, table: "Catalogue | None"
+    file: Path, tour: "Tour", problem: str | None, catalogue: str | None
 ) -> "Verification":
     """Check one tour, print how it fares, and return it."""
-    from seqsearch.problems.problem_file import table_at_hand
-    from seqsearch.problems.rules_of import differences, rules_of
+    from feasibility.orbits import read_catalogue
+    from seqsearch.problems.problem_file import table_at_hand, whole_catalogue, with_catalogue
+    from seqsearch.problems.rules_of import differences, kernels_at_hand, rules_of
     from seqsearch.tours.checks import Check, Verification
     from seqsearch.tours.verify import verify_tour
 
     say(tour.one_line())
     config, source = _problem_of(file, tour, problem)
     if config is None:
+        table = None if catalogue is None else read_catalogue(Path(catalogue))
         verification = _print(verify_tour(tour, table), file, tour)
         say(
             "checked against the rules in its own file alone, which prove nothing; "
@@ -96,13 +97,23 @@ def _verified(
         )
         unknown = Check("rules of a known problem", False, "the file's own", "a problem's")
         return Verification((*verification.checks, unknown))
-    table = table or table_at_hand(config)
+    if catalogue is None:
+        table = table_at_hand(config)
+    else:
+        config = with_catalogue(config, catalogue)
+        table = whole_catalogue(config)
+    kernels = kernels_at_hand(config)
     rules = rules_of(config, tour, table)
     say(f"rules of problem {rules.name}, from {source}")
     for difference in differences(tour.rules, rules):
         say(f"the file states other rules: {difference}")
-    verification = _print(verify_tour(tour, table, rules), file, tour)
-    if not verification.passed and verify_tour(tour, table).passed:
+    verification = _print(verify_tour(tour, table, rules, kernels), file, tour)
+    if rules.kernels and not kernels:
+        say(
+            f"the bodies move as the kernels say, which are not at {config.catalogue.file}: "
+            "arrivals are not checked; say where they are with --catalogue PATH"
+        )
+    if not verification.passed and verify_tour(tour, table, kernels=kernels).passed:
         say("it keeps only the rules in its own file")
     return verification
 

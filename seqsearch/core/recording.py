@@ -3,13 +3,14 @@
 from typing import Final
 
 import numpy as np
+from msgspec import UNSET, UnsetType
 from numpy.typing import NDArray
 
 from feasibility.constants import DAY_S
 from feasibility.orbits import Catalogue
 from seqsearch.core.problem import Problem
 from seqsearch.core.tree import FlownLeg, SearchTree
-from seqsearch.tours.records import Impulse, TourBody, TourLeg
+from seqsearch.tours.records import Impulse, State, TourBody, TourLeg
 from seqsearch.tours.tour import Tour
 
 _REST_M_S: Final = 1e-6
@@ -72,7 +73,17 @@ def _leg(problem: Problem, leg: FlownLeg) -> TourLeg:
         dep_velocity_m_s=_relative(problem, leg.dep_row, leg.t_dep_mjd2000, leg.rv_dep),
         arr_velocity_m_s=_relative(problem, leg.arr_row, leg.t_arr_mjd2000, leg.rv_arr),
         dropped_kg=leg.dropped,
+        dep_body_state=_told(problem.catalogue, leg.dep_row, leg.t_dep_mjd2000),
+        arr_body_state=_told(problem.catalogue, leg.arr_row, leg.t_arr_mjd2000),
     )
+
+
+def _told(catalogue: Catalogue, row: int, t_mjd2000: float) -> State | UnsetType:
+    """Return where a body is, if that does not follow from its elements."""
+    if catalogue.ephemeris is None:
+        return UNSET
+    x, y, z, vx, vy, vz = (float(value) for value in catalogue.states_at([row], t_mjd2000)[0])
+    return (x, y, z, vx, vy, vz)
 
 
 def _relative(

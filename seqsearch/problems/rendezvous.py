@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Final, final
 
 import numpy as np
+from msgspec import UNSET, UnsetType
 from numpy.typing import NDArray
 
 from feasibility import InputError, Legs, Spacecraft
@@ -16,6 +17,7 @@ from seqsearch.core.mission import days_until_end, not_visited, used_up
 from seqsearch.core.nodes import Nodes
 from seqsearch.core.tree import FlownLeg
 from seqsearch.settings import SearchSettings
+from seqsearch.tours.records import KernelFile
 from seqsearch.tours.tour import TourRules
 
 _MAX_ACCELERATION: Final = 0.01
@@ -202,4 +204,12 @@ class RendezvousProblem:
             max_duration_days=self.max_duration_days,
             min_stay_days=self.min_stay_days,
             start_ids=self.start_ids,
+            kernels=_kernels_of(self.catalogue),
         )
+
+
+def _kernels_of(catalogue: Catalogue) -> tuple[KernelFile, ...] | UnsetType:
+    if catalogue.ephemeris is None:
+        return UNSET
+    sources = catalogue.ephemeris.sources
+    return tuple(KernelFile(name=source.name, sha256=source.sha256) for source in sources)

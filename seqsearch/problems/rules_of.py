@@ -1,11 +1,14 @@
 """What a problem asks of a given tour, without trusting the tour's own file."""
 
+from pathlib import Path
+
 import msgspec
 import numpy as np
 
 from feasibility.orbits import Catalogue
+from feasibility.orbits.spk.files import kernel_files
 from seqsearch.problems.problem_file import Config, build_problem
-from seqsearch.tours.records import TourBody
+from seqsearch.tours.records import KernelFile, TourBody
 from seqsearch.tours.tour import Tour, TourRules
 
 
@@ -31,7 +34,26 @@ def rules_of(config: Config, tour: Tour, catalogue: Catalogue | None = None) -> 
         # Which bodies were excluded plays no part in the rules.
         table = msgspec.structs.replace(config.catalogue, exclude_ids=())
         config = msgspec.structs.replace(config, catalogue=table)
-    return build_problem(config, catalogue).tour_rules()
+    rules = build_problem(config, catalogue).tour_rules()
+    if config.catalogue.ephemeris == "spk" and not rules.kernels:
+        # What the tour says of them is better than silence: the verification asks for them.
+        named = KernelFile(name=Path(config.catalogue.file or "a kernel").name, sha256="unknown")
+        rules = msgspec.structs.replace(rules, kernels=tour.rules.kernels or (named,))
+    return rules
+
+
+def kernels_at_hand(config: Config) -> tuple[Path, ...]:
+    """Return the SPK kernels from which a configuration's bodies move; none where none do.
+
+    Raises
+    ------
+    InputError
+        They are there, but cannot be used.
+    """
+    path = Path(config.catalogue.file or "")
+    if config.catalogue.ephemeris != "spk" or not path.exists():
+        return ()
+    return kernel_files(path).spk
 
 
 def differences(found: TourRules, expected: TourRules) -> list[str]:

@@ -12,8 +12,9 @@ import numpy as np
 
 from feasibility.constants import AU
 from feasibility.runtime.atomic import atomic_path
+from seqsearch.tours.bodies.told_motion import motion_of
 from seqsearch.tours.dates import date_of
-from seqsearch.tours.paths import body_states, impulsive_trajectory, orbit_points
+from seqsearch.tours.paths import impulsive_trajectory, orbit_points
 from seqsearch.tours.pictures.stops import stops
 from seqsearch.tours.tour import Tour
 
@@ -101,10 +102,9 @@ def plot_path(tour: Tour, axes: "Axes") -> None:
         colour = colormaps["viridis"](0.86 * k / max(1, len(phases) - 1))
         track = phase.states[:, :2] / AU
         axes.plot(track[:, 0], track[:, 1], color=colour, linewidth=1.7, zorder=2)
-    mu = tour.rules.mu_m3_s2
     marked: list[tuple[float, float]] = []
     for stop in stops(tour):
-        x, y = (body_states(stop.body, [stop.t_mjd2000], mu)[0, :2] / AU).tolist()
+        x, y = (motion_of(tour, stop.body, [stop.t_mjd2000])[0, :2] / AU).tolist()
         axes.plot(x, y, "o", color="black", markersize=2.8, zorder=4)
         radius = max(float(np.hypot(x, y)), 1e-9)
         # Where an earlier number stands already, the later one stands further out.
@@ -118,7 +118,7 @@ def plot_path(tour: Tour, axes: "Axes") -> None:
         )  # fmt: skip
         if stop.stay_days:
             days = np.linspace(0.0, stop.stay_days, 12)
-            stay = body_states(stop.body, stop.t_mjd2000 + days, mu)[:, :2] / AU
+            stay = motion_of(tour, stop.body, stop.t_mjd2000 + days)[:, :2] / AU
             axes.plot(stay[:, 0], stay[:, 1], color=_ORANGE, linewidth=2.6, zorder=3)
     axes.plot(0, 0, "o", color=_ORANGE, markeredgecolor="black", markeredgewidth=0.5)
     axes.set_aspect("equal", adjustable="datalim")
