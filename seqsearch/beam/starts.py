@@ -30,6 +30,13 @@ _SOFT: Final = 0.3
 
 _PAIRS_AT_ONCE: Final = 300
 
+_MANY_BODIES: Final = 100_000
+"""From so many on, crowds are measured only where neighbourhoods are dense; no published
+competition has as many."""
+_SPARE: Final = 4
+"""How many times as many bodies are measured as are wanted: between the epoch in question and that
+of the neighbours' bucket, distances change by some per cent."""
+
 Starts = Callable[[SearchSettings, np.random.Generator], Nodes]
 """Chooses the start nodes of a pass."""
 
@@ -167,11 +174,14 @@ def _crowded(
     crowd = min(_CROWD, len(problem.catalogue) - 1)
     rows, times, distances = [], [], []
     for epoch in earliest + slices * (latest - earliest):
-        near = neighbours.query(allowed, np.full(len(allowed), epoch), crowd)
+        here = allowed
+        if len(allowed) >= _MANY_BODIES:
+            here = allowed[neighbours.densest(allowed, epoch, crowd, _SPARE * per_epoch)]
+        near = neighbours.query(here, np.full(len(here), epoch), crowd)
         points = orbital_metric(problem.catalogue.states(epoch), settings.reference_tof_days)
-        distance = np.linalg.norm(points[near[:, -1]] - points[allowed], axis=1)
+        distance = np.linalg.norm(points[near[:, -1]] - points[here], axis=1)
         best = np.argsort(distance, kind="stable")[:per_epoch]
-        rows.append(allowed[best])
+        rows.append(here[best])
         times.append(np.full(len(best), epoch))
         distances.append(distance[best])
     return np.concatenate(rows), np.concatenate(times), np.concatenate(distances)
