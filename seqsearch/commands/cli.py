@@ -11,7 +11,18 @@ from feasibility.runtime.interrupts import interrupt_code, interruptible
 from feasibility.runtime.terminal import end_output
 from feasibility.runtime.warning_lines import warnings_as_lines
 from feasibility.sims_flanagan.fast.compilation import prefer_fast_compilation
-from seqsearch.commands import bodies, plot, polish, problems, resume, run, verify
+from seqsearch.commands import (
+    bodies,
+    export,
+    plot,
+    polish,
+    problems,
+    refine,
+    report,
+    resume,
+    run,
+    verify,
+)
 from seqsearch.commands.options import set_output
 
 _DESCRIPTION: Final = """\
@@ -25,11 +36,25 @@ Sims-Flanagan model.
   seqsearch problems                      what else there is
   seqsearch resume runs/demo              go on after an interruption
   seqsearch polish runs/demo              improve its tour
+  seqsearch refine runs/demo              from impulses to continuous thrust
   seqsearch verify runs/demo              check the result independently
+  seqsearch report runs/demo              look at it in a browser
+  seqsearch export runs/demo --to csv --out tour.csv
   seqsearch bodies MPCORB.DAT             what is in an asteroid table
 """
 
-_COMMANDS: Final = (run, resume, polish, verify, plot, problems, bodies)
+_COMMANDS: Final = (
+    run,
+    resume,
+    polish,
+    refine,
+    verify,
+    plot,
+    report,
+    export,
+    problems,
+    bodies,
+)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

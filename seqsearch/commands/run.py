@@ -72,6 +72,7 @@ def _run(options: argparse.Namespace) -> int:
             time_limit_s=seconds(options.time_limit),
             max_solves=options.max_solves,
             workers=options.workers,
+            scheduler=options.scheduler,
         ),
         overrides={
             "beam_width": options.beam_width,
@@ -134,5 +135,11 @@ def run_search(
         return code, folder
     code = begin_search(config, folder, seed, limits)
     if code == 0 and polish_s is not None:
-        code = polish_run(folder, time_limit_s=polish_s, seed=seed, workers=limits.workers)
+        code = polish_run(
+            folder,
+            time_limit_s=polish_s,
+            seed=seed,
+            workers=limits.workers,
+            scheduler=limits.scheduler,
+        )
     return code, folder
