@@ -95,7 +95,11 @@ def test_vectors_become_the_elements_from_which_they_are(tmp_path_factory, many)
 
 
 def test_comets_on_ellipses_are_read_and_the_others_counted(tmp_path):
-    comets = [Body(1, "Halley", a=17.8, e=0.967), Body(2, "Gone", e=1.0002), Body(67, "C-G", e=0.6)]
+    comets = [
+        Body(1, "Halley", a=17.8, e=0.967),
+        Body(2, "Gone", e=1.0002),
+        Body(67, "C-G", e=0.6),
+    ]
     table = read_bodies(written(tmp_path, publishers.comet(comets)))
     assert table.names == ("1P/Halley", "67P/C-G")
     kept = [comets[0], comets[2]]
@@ -165,23 +169,29 @@ def test_horizons_in_several_layouts(tmp_path):
     cos, sin = np.cos(np.radians(84381.448 / 3600)), np.sin(np.radians(84381.448 / 3600))
     turn = np.array([[1, 0, 0], [0, cos, -sin], [0, sin, cos]])
     body = Body()
-    text = publishers.horizons_vectors([body], lambda s: np.concatenate([turn @ s[:3], turn @ s[3:]]))
+    text = publishers.horizons_vectors(
+        [body], lambda s: np.concatenate([turn @ s[:3], turn @ s[3:]])
+    )
     text = text.replace("Ecliptic of J2000.0", "ICRF")
     assert_allclose(read_bodies(written(tmp_path, text)).orbits[0], body.orbit, rtol=1e-9)
-    old = text.replace("Reference frame : ICRF", "Coordinate systm: Earth Mean Equator and Equinox")
+    old = text.replace(
+        "Reference frame : ICRF", "Coordinate systm: Earth Mean Equator and Equinox"
+    )
     assert_allclose(read_bodies(written(tmp_path, old)).orbits[0], body.orbit, rtol=1e-9)
     elements = publishers.horizons_elements([body, Body(4, "Other")])
     assert_array_equal(read_bodies(written(tmp_path, elements)).ids, [3, 4])
     long = (
         elements.split("   JDTDB")[0] + "*****\n$$SOE\n2459000.500000000 = A.D. 2020-May-31 TDB\n"
-        " EC= 1.0E-01 QR= 2.25E+00 IN= 7.0E+00\n OM= 1.0E+02 W = 2.0E+02 Tp=  2458240.179130943492\n"
+        " EC= 1.0E-01 QR= 2.25E+00 IN= 7.0E+00\n OM= 1.0E+02 W = 2.0E+02 Tp=  2458240.179130943\n"
         " N = 2.1E-01 MA= 3.0E+02 TA= 1.3E+02\n A = 2.5E+00 AD= 2.9E+00 PR= 1.6E+03\n"
         "2459010.500000000 = A.D. 2020-Jun-10 TDB\n EC= 9.0E-01 A = 9.0\n$$EOE\n"
     )
     table = read_bodies(written(tmp_path, long))
     assert_array_equal(table.orbits[0], body.orbit)
     assert table.notes == (": 2 epochs of 3 Someone, of which the first is read, MJD 59000",)
-    km = publishers.horizons("A EC IN OM W MA".split(), body, (3.74e8, 0.1, 7, 1, 2, 3), "KM-S, deg")
+    km = publishers.horizons(
+        ("A", "EC", "IN", "OM", "W", "MA"), body, (3.74e8, 0.1, 7, 1, 2, 3), "KM-S, deg"
+    )
     assert_allclose(read_bodies(written(tmp_path, km)).orbits[0, 1], 2.5000358, rtol=1e-7)
 
 
@@ -210,7 +220,10 @@ FAULTS = {
     "count": (json.dumps(QUERY | {"count": 3}), "count is 3, but data has 2 rows"),
     "none found": ('{"signature": {}, "count": 0}', "found no bodies"),
     "an error": ('{"message": "invalid query", "code": "400"}', "answered 'invalid query'"),
-    "short row": (json.dumps(QUERY | {"data": [[1, 2]], "count": 1}), "row 1: 2 cells, expected 9"),
+    "short row": (
+        json.dumps(QUERY | {"data": [[1, 2]], "count": 1}),
+        "row 1: 2 cells, expected 9",
+    ),
     "no field": (
         json.dumps(QUERY | {"fields": ["full_name", *"bcdefgh", "H"]}),
         "no field .*epoch.* expected fields such as",
@@ -236,8 +249,14 @@ FAULTS = {
     "aberration": (VECTORS.replace("GEOMETRIC", "LT+S"), "output type 'LT.S states'; expected"),
     "Horizons cut": (VECTORS.partition("$$EOE")[0], r"ends before \$\$EOE"),
     "no vector": (VECTORS.replace(" VZ,", " ZZ,"), "no A, EC, IN, OM, W, MA and no X, Y, Z"),
-    "equinoctial": (publishers.astdys([Body()]).replace("'KEP'", "'EQU'"), "line 3: elem is 'EQU'"),
-    "AstDyS cut": (publishers.astdys([Body()])[:-110], "line 7: . numbers behind a name in quotes"),
+    "equinoctial": (
+        publishers.astdys([Body()]).replace("'KEP'", "'EQU'"),
+        "line 3: elem is 'EQU'",
+    ),
+    "AstDyS cut": (
+        publishers.astdys([Body()])[:-110],
+        "line 7: . numbers behind a name in quotes",
+    ),
 }
 
 
@@ -290,7 +309,12 @@ def mutated(data, rng):
 def check_mutations(folder, count):
     many = [Body(k, f"Body {k}", h=10.0 + k) for k in range(1, 6)]
     known = {(body.number, body.orbit) for body in many}
-    writers = {**FORMATS, **FIXED, "vectors": publishers.horizons_vectors, "comets": publishers.comet}
+    writers = {
+        **FORMATS,
+        **FIXED,
+        "vectors": publishers.horizons_vectors,
+        "comets": publishers.comet,
+    }
     for label, write in writers.items():
         original = write(many[:1] if label in ONE_BODY else many).encode()
         for k in range(count):
@@ -324,10 +348,12 @@ def test_a_line_of_mpcorb_that_lost_or_won_a_letter_is_refused(tmp_path):
     for place in range(103):
         for line in (LINE[:place] + LINE[place + 1 :], LINE[:place] + "1" + LINE[place:]):
             path = written(tmp_path, f"{publishers.mpc_line(Body(9))}\n{line}\n")
+            message = "line 2"
             try:
                 table = read_bodies(path)
             except InputError as error:
-                assert "line 2" in str(error), place
+                message = str(error)
             else:
                 # Blanks before the first digit of the orbit may come and go: the rest moved.
                 assert_array_equal(table.orbits[1], Body().orbit, err_msg=f"{place}")
+            assert "line 2" in message, place
