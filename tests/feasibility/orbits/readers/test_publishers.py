@@ -127,6 +127,14 @@ def test_open_orbits_are_kept_out_counted_and_said(tmp_path, label):
     assert_array_equal(catalogue.epoch_mjd2000, [59000 - 51544, 58000 - 51544])
 
 
+def test_comets_from_far_away_do_not_lose_the_table(tmp_path):
+    many = [Body(1), Body(2, a=20_000.0, e=0.9999)]
+    for label in ("CSV", "SBDB query", "GTOC12"):
+        table = read_bodies(written(tmp_path, FORMATS[label](many)))
+        assert table.ids.tolist() == [1]
+        assert "1 with a semi-major axis outside 0.001 to 10 000 AU" in table.left_out_line()
+
+
 def test_designations_are_unpacked():
     known = {
         "J95X00A": "1995 XA",
