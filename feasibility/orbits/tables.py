@@ -1,6 +1,7 @@
 """Asteroid tables: those of the GTOC problems, of the MPC and JPL, and any with a header.
 
-A table is read by the names in its header line, whatever the file is called and in
+Formats of agencies have a reader each in `feasibility.orbits.readers`; `_read` asks them in turn.
+Any other table is read by the names in its header line, whatever the file is called and in
 whatever order the columns stand, parted by commas, semicolons, bars, tabs or blanks:
 
 =========  =====================================================================
@@ -26,10 +27,10 @@ size. A unit that is not known is an error. A table of one's own is best written
 Of the GTOC problems mind that 3, 5 and 7 give the argument of perihelion before the node, 4
 has names in single quotes, and 2 lists the Earth as group 5 after its 910 asteroids, which is left
 out: a table is read for its asteroids, and `earth` has the Earth. What a table has beside ids,
-names and orbits (group, mass) is in the catalogue's `extra` by the column's name. The MPC's
-``MPCORB.DAT`` and elements of JPL Horizons are read too. Empty lines and comments (``#``, ``%``)
-are skipped; files may be gzipped. Kernels are no tables, but are read too: an SPK kernel, a
-folder of them or a meta-kernel, see `feasibility.orbits.spk.reading`.
+names and orbits (group, mass, H, ...) is in the catalogue's `extra` by the column's name. Comets
+may have ``q`` and ``tp`` (MJD, Julian date or YYYYMMDD.D) in place of a and M. Empty lines and
+comments (``#``, ``%``) are skipped; files may be gzipped. Kernels are no tables, but are read too:
+an SPK kernel, a folder of them or a meta-kernel, see `feasibility.orbits.spk.reading`.
 """
 
 import warnings

@@ -30,6 +30,15 @@ _SOFT: Final = 0.3
 
 _PAIRS_AT_ONCE: Final = 300
 
+_MANY_BODIES: Final = 100_000
+"""From so many on, crowds are measured only where neighbourhoods are dense, and each epoch looks
+at bodies of its own; no published competition has as many."""
+_BODIES_AN_EPOCH: Final = 25_000
+"""How many bodies an epoch looks at then, among them every k-th: epochs take turns."""
+_SPARE: Final = 4
+"""How many times as many bodies are measured as are wanted: between the epoch in question and that
+of the neighbours' bucket, distances change by some per cent."""
+
 Starts = Callable[[SearchSettings, np.random.Generator], Nodes]
 """Chooses the start nodes of a pass."""
 
@@ -166,12 +175,17 @@ def _crowded(
     allowed = problem.start_rows()
     crowd = min(_CROWD, len(problem.catalogue) - 1)
     rows, times, distances = [], [], []
-    for epoch in earliest + slices * (latest - earliest):
-        near = neighbours.query(allowed, np.full(len(allowed), epoch), crowd)
+    for turn, epoch in enumerate(earliest + slices * (latest - earliest)):
+        here = allowed
+        if len(allowed) >= _MANY_BODIES:
+            step = len(allowed) // _BODIES_AN_EPOCH
+            here = allowed[turn % step :: step]
+            here = here[neighbours.densest(here, epoch, crowd, _SPARE * per_epoch)]
+        near = neighbours.query(here, np.full(len(here), epoch), crowd)
         points = orbital_metric(problem.catalogue.states(epoch), settings.reference_tof_days)
-        distance = np.linalg.norm(points[near[:, -1]] - points[allowed], axis=1)
+        distance = np.linalg.norm(points[near[:, -1]] - points[here], axis=1)
         best = np.argsort(distance, kind="stable")[:per_epoch]
-        rows.append(allowed[best])
+        rows.append(here[best])
         times.append(np.full(len(best), epoch))
         distances.append(distance[best])
     return np.concatenate(rows), np.concatenate(times), np.concatenate(distances)
