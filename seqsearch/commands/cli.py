@@ -14,6 +14,7 @@ from feasibility.sims_flanagan.fast.compilation import prefer_fast_compilation
 from seqsearch.commands import (
     bodies,
     export,
+    fly,
     plot,
     polish,
     problems,
@@ -33,6 +34,7 @@ pruner drops those that cannot be flown, and the rest are optimised in the
 Sims-Flanagan model.
 
   seqsearch run demo                      a synthetic belt; needs no file
+  seqsearch fly 3673 2764 --problem demo  a sequence of your own
   seqsearch problems                      what else there is
   seqsearch resume runs/demo              go on after an interruption
   seqsearch polish runs/demo              improve its tour
@@ -45,6 +47,7 @@ Sims-Flanagan model.
 
 _COMMANDS: Final = (
     run,
+    fly,
     resume,
     polish,
     refine,
