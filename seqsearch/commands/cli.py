@@ -15,6 +15,7 @@ from seqsearch.commands import (
     bodies,
     export,
     fetch,
+    fly,
     plot,
     polish,
     problems,
@@ -34,6 +35,7 @@ pruner drops those that cannot be flown, and the rest are optimised in the
 Sims-Flanagan model.
 
   seqsearch run demo                      a synthetic belt; needs no file
+  seqsearch fly 3673 2764 --problem demo  a sequence of your own
   seqsearch problems                      what else there is
   seqsearch resume runs/demo              go on after an interruption
   seqsearch polish runs/demo              improve its tour
@@ -47,6 +49,7 @@ Sims-Flanagan model.
 
 _COMMANDS: Final = (
     run,
+    fly,
     resume,
     polish,
     refine,

@@ -117,6 +117,7 @@ def run_search(
     )
     from seqsearch.runs.begin import begin_search
     from seqsearch.runs.fleet_run import run_fleet
+    from seqsearch.runs.flying import fly_run
     from seqsearch.runs.polishing import polish_run
 
     if seed < 0:
@@ -130,6 +131,8 @@ def run_search(
         # The run folder's copy is read from elsewhere when the run is resumed.
         config = with_catalogue(config, str(Path(config.catalogue.file).absolute()))
     folder = out or Path("runs") / config.problem.name
+    if config.mission.sequence:
+        return fly_run(config, folder, seed, limits), folder
     if config.fleet.probes > 1:
         code = run_fleet(config, folder, seed=seed, limits=limits, search_probe=begin_search)
         return code, folder

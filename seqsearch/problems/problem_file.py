@@ -69,12 +69,16 @@ class SpacecraftTable(_Table, frozen=True, kw_only=True):
 
 @final
 class MissionTable(_Table, frozen=True, kw_only=True):
-    """Table ``[mission]``; epochs in MJD, or as dates such as ``2030-01-01``."""
+    """Table ``[mission]``; epochs in MJD, or as dates such as ``2030-01-01``.
+
+    With a `sequence` these bodies alone are visited, in this order.
+    """
 
     first_departure_mjd: tuple[float, float]
     max_duration_days: float
     min_stay_days: float = 0.0
     start_ids: tuple[int, ...] = ()
+    sequence: tuple[int, ...] = ()
 
 
 @final
@@ -240,6 +244,12 @@ def with_selection(config: Config, select: str) -> Config:
     return msgspec.structs.replace(config, catalogue=table)
 
 
+def with_sequence(config: Config, sequence: tuple[int, ...]) -> Config:
+    """Return the configuration with a sequence of bodies to visit in this order."""
+    mission = msgspec.structs.replace(config.mission, sequence=sequence)
+    return msgspec.structs.replace(config, mission=mission)
+
+
 def build_problem(config: Config, catalogue: Catalogue | None = None) -> Problem:
     """Load the catalogue and build the validated problem.
 
@@ -261,15 +271,20 @@ def build_problem(config: Config, catalogue: Catalogue | None = None) -> Problem
     craft = config.spacecraft
     mission = config.mission
     earliest, latest = mission.first_departure_mjd
+    bodies = _without_excluded(catalogue or whole_catalogue(config), config)
+    if mission.sequence:
+        # The others play no part, and most of the work would be to look at them.
+        bodies = bodies.select(np.unique(bodies.rows_of(np.asarray(mission.sequence))))
     base = RendezvousProblem(
         name=config.problem.name,
-        catalogue=_without_excluded(catalogue or whole_catalogue(config), config),
+        catalogue=bodies,
         spacecraft=Spacecraft(craft.dry_mass_kg, craft.thrust_n, craft.isp_s),
         m0=craft.wet_mass_kg,
         first_departure_mjd2000=(mjd_to_mjd2000(earliest), mjd_to_mjd2000(latest)),
         max_duration_days=mission.max_duration_days,
         min_stay_days=mission.min_stay_days,
         start_ids=_start_ids(config),
+        sequence=mission.sequence,
     )
     own = [
         (plugin, rules) for plugin in plugins().values() if (rules := _rules_of(config, plugin))
@@ -278,6 +293,11 @@ def build_problem(config: Config, catalogue: Catalogue | None = None) -> Problem
         raise InputError(
             f"problem {config.problem.name}: tables [{own[0][0].name}] and [{own[1][0].name}], "
             "expected the rules of one problem"
+        )
+    if own and mission.sequence:
+        raise InputError(
+            f"problem {config.problem.name}: a sequence and a table [{own[0][0].name}], expected "
+            "a sequence only in tours of rendezvous alone"
         )
     for plugin, rules in own:
         if plugin.build is not None:

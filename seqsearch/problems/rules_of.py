@@ -30,7 +30,7 @@ def rules_of(config: Config, tour: Tour, catalogue: Catalogue | None = None) -> 
         A value of the problem file is out of range, or its rules need the table.
     """
     if catalogue is None:
-        catalogue = _bodies_of(tour, config.mission.start_ids)
+        catalogue = _bodies_of(tour, (*config.mission.start_ids, *config.mission.sequence))
         # Which bodies were excluded plays no part in the rules.
         table = msgspec.structs.replace(config.catalogue, exclude_ids=())
         config = msgspec.structs.replace(config, catalogue=table)
@@ -71,11 +71,11 @@ def _short(value: object) -> str:
     return text if len(text) <= 60 else text[:57] + "..."
 
 
-def _bodies_of(tour: Tour, start_ids: tuple[int, ...]) -> Catalogue:
-    """Return the visited bodies as a catalogue; the first stands in for missing start bodies."""
+def _bodies_of(tour: Tour, named: tuple[int, ...]) -> Catalogue:
+    """Return the visited bodies as a catalogue; the first stands in for others that are named."""
     bodies = {body.id: body for body in tour.visits or tour.bodies}
     first = next(iter(bodies.values()))
-    for body_id in (*start_ids, max(bodies) + 1):
+    for body_id in (*named, max(bodies) + 1):
         bodies.setdefault(body_id, first)
     return Catalogue(
         ids=list(bodies),
