@@ -74,7 +74,7 @@ def _led(text: str, source: str) -> str:
     folder = ROOT if home else (DOCS / source).parent
 
     def lead(match: "re.Match[str]") -> str:
-        target, anchor = match[1], match[2]
+        target, anchor = match[1], match[2] or ""
         file = Path(os.path.normpath(folder / target))
         if file.parent == ROOT and file.name in JOINING:
             there = JOINING[file.name]
