@@ -174,6 +174,7 @@ def _run_rank(tools: Tools, beam: Beam, state: SearchState) -> None:
     began = time.perf_counter()
     settings = beam.guide.settings(state.settings)
     nodes = beam.frontier.pop(settings.beam_width)
+    nodes = tools.pacing.narrowed(beam.guide, nodes, state.counters)
     counters = RankCounters(
         pass_number=state.pass_number, rank=int(nodes.depth.max()) + 1, nodes=len(nodes)
     )
