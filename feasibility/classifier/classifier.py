@@ -41,7 +41,8 @@ class FeasibilityClassifier:
     Raises
     ------
     InputError
-        The artefact has features or a kind of model that this version does not know.
+        The artefact has features or a kind of model that this version does not know, or arrays
+        that do not fit together.
 
     Examples
     --------
@@ -54,6 +55,7 @@ class FeasibilityClassifier:
     """
 
     def __init__(self, artefact: Artefact) -> None:
+        check_model(artefact)
         self.artefact = artefact
         self._estimator: MarginEstimator | PaperEstimator
         if artefact.feature_set == paper.FEATURE_SET:
@@ -87,7 +89,6 @@ class FeasibilityClassifier:
         if path != DEFAULT:
             artefact = Artefact.load(Path(path))
             try:
-                check_model(artefact)
                 return cls(artefact)
             except InputError as error:
                 raise InputError(f"{path}: {error}") from None

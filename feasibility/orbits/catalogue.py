@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from types import MappingProxyType
-from typing import Any, final
+from typing import Any, Final, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,6 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 from feasibility.constants import DAY_S, MU_SUN
 from feasibility.errors import InputError
 from feasibility.orbits.classical import perifocal_axes
+from feasibility.quantities import plain_numbers
+
+_ELEMENT_UNITS: Final = ("m", "", "rad", "rad", "rad", "rad")
 
 
 @final
@@ -20,7 +23,8 @@ class Catalogue:
     """Bodies in heliocentric two-body motion, one row a body.
 
     With n the number of bodies. Arrays are copied once, validated once and
-    made read-only.
+    made read-only. Quantities with units (astropy, pint) are converted; elements, which have
+    several units, as rows of single quantities.
 
     Parameters
     ----------
@@ -42,9 +46,9 @@ class Catalogue:
     Raises
     ------
     InputError
-        A shape does not fit, an epoch or element is not finite, an orbit is not an
-        ellipse (a <= 0 or e outside [0, 1)), or an id occurs twice. The message names
-        the first bad row.
+        A shape does not fit, a unit cannot be converted, an epoch or element is not finite,
+        an orbit is not an ellipse (a <= 0 or e outside [0, 1)), or an id occurs twice. The
+        message names the first bad row.
 
     Examples
     --------
@@ -71,7 +75,7 @@ class Catalogue:
         extra: Mapping[str, ArrayLike] | None = None,
     ) -> None:
         id_column = _integers("Catalogue ids", ids)
-        element_rows = np.array(elements, dtype=np.float64)
+        element_rows = _numbers("Catalogue elements", elements, _ELEMENT_UNITS)
         n = len(id_column)
         if n == 0:
             element_rows = element_rows.reshape(0, 6)
@@ -82,7 +86,7 @@ class Catalogue:
             )
         if len(names) != n:
             raise InputError(f"Catalogue names: {len(names)} names, expected {n}, one an id")
-        epochs = np.array(epoch_mjd2000, dtype=np.float64)
+        epochs = _numbers("Catalogue epoch_mjd2000", epoch_mjd2000, ("day",))
         if epochs.shape not in ((), (1,), (n,)):
             raise InputError(
                 f"Catalogue epoch_mjd2000: expected shape ({n},) or one value, got {epochs.shape}"
@@ -292,6 +296,16 @@ class Catalogue:
         return packed
 
 
+def _numbers(label: str, values: ArrayLike, units: tuple[str, ...]) -> NDArray[np.float64]:
+    """Return a copy as float64, of quantities with units in the given ones."""
+    try:
+        return np.array(plain_numbers(label, values, units), dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(f"{label}: expected numbers ({error})") from None
+
+
 def _integers(what: str, values: ArrayLike) -> NDArray[np.int64]:
     array = np.atleast_1d(np.asarray(values))
     if array.size == 0:
@@ -305,8 +319,11 @@ def _integers(what: str, values: ArrayLike) -> NDArray[np.int64]:
 
 def _extra_column(name: str, values: ArrayLike, n: int) -> NDArray[np.float64]:
     try:
-        column = np.array(values, dtype=np.float64)
-    except (TypeError, ValueError):
+        plain = plain_numbers(f"Catalogue extra {name!r}", values, ())
+        column = np.array(plain, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        if isinstance(error, InputError):
+            raise
         raise InputError(f"Catalogue extra {name!r}: expected numbers") from None
     if column.shape != (n,):
         raise InputError(
