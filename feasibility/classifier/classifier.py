@@ -160,6 +160,20 @@ class FeasibilityClassifier:
         """
         return self.predict(legs).final_mass
 
+    def final_mass_error(self, legs: Legs) -> NDArray[np.float64]:
+        """Return (n,) kg, how far `final_mass` is at most from the truth on 68 % of such legs.
+
+        As one standard deviation would say. The truth is the solution with least propellant.
+        NaN where nothing is known, where the leg is evidently too heavy (margin below 0.95), and
+        for models without final masses. `predict` gives both from one computation.
+
+        Raises
+        ------
+        InputError
+            As for `margin`.
+        """
+        return self.predict(legs).final_mass_error
+
     def predict(self, legs: Legs) -> LegPrediction:
         """Return margin, probability, final mass and more of n legs, at the cost of one of them.
 

@@ -88,9 +88,8 @@ def _check_margin(artefact: Artefact) -> None:
         k = len(mass["mean"])
         known = (len(BOUND_INPUTS), len(FINAL_MASS_INPUTS))
         _expect(k in known, f"final_mass: {k} inputs, expected {known[0]} or {known[1]}")
-        if "error_factor" in mass:
-            factor = _one(mass, "error_factor")
-            _expect(factor > 0.0, "array final_mass/error_factor, expected more than zero")
+        if "error_fit" in mass:
+            _numbers(mass, "error_fit", 3)
     k = artefact.section("model")["weight_0"].shape[1]
     _expect(k == len(artefact.features), f"{len(artefact.features)} features for {k} inputs")
     _numbers(artefact.section("quick"), "settled", 2)

@@ -114,7 +114,8 @@ def make_shard(task: ShardTask) -> Columns:
         labels = _convergence_labels(draw, protocol.solver, starts)
     elif protocol.margin_range is not None:
         # Again for the whole shard.
-        log_margin = margins.uniform(*np.log(protocol.margin_range), full)[: task.rows]
+        low, high = (float(np.log(margin)) for margin in protocol.margin_range)
+        log_margin = margins.uniform(low, high, full)[: task.rows]
         labels = _margin_range_labels(draw, protocol, log_margin)
     else:
         labels = _margin_labels(draw, protocol, chosen, log_ratio)

@@ -72,8 +72,8 @@ class Protocol(_Table, frozen=True, kw_only=True):
     label : "margin" or "convergence"
         What makes a leg feasible: initial mass up to m*, or, as in the paper,
         that the minimum-propellant problem converged from one random start.
-    solver : "fast", "reference" or "best"
-        Leg solver of m*, and of the minimum propellant; "best" asks both.
+    solver : "fast", "reference", "best" or "auto"
+        Leg solver of m*, and of the minimum propellant, as `method` of `optimise`.
     propellant : bool
         Whether the minimum-propellant problem is solved where the leg is flyable
         (margin label only).
@@ -95,7 +95,7 @@ class Protocol(_Table, frozen=True, kw_only=True):
     name: str
     description: str = ""
     label: Literal["margin", "convergence"] = "margin"
-    solver: Literal["fast", "reference", "best"] = "fast"
+    solver: Literal["fast", "reference", "best", "auto"] = "fast"
     propellant: bool = True
     boundary_share: Annotated[float, Meta(ge=0, le=1)] = 0.0
     boundary_sigma: Annotated[float, Meta(gt=0)] = 0.05

@@ -189,7 +189,7 @@ def test_elements_whose_units_would_be_dropped_are_refused(quantity):
     plain = body().elements
     with pytest.raises(InputError, match=r"Catalogue elements: has a unit \(km\)"):
         body(elements=quantity(plain, "km"))
-    with pytest.raises(InputError, match="Catalogue elements: .*expected plain numbers in m$"):
+    with pytest.raises(InputError, match=r"Catalogue elements: .*expected plain numbers in m$"):
         body(elements=[[quantity(1.0, "kg"), *plain[0, 1:]]])
     with pytest.raises(InputError, match=r"Catalogue extra 'mass': has a unit \(kg\)"):
         body(extra={"mass": quantity([1.0], "kg")})

@@ -17,7 +17,7 @@ from feasibility.classifier.margin.features import (
     margin_features,
     quick_features,
 )
-from feasibility.classifier.margin.final_mass import final_mass
+from feasibility.classifier.margin.final_mass import AS_IT_SAYS, final_mass
 from feasibility.classifier.margin.network import MarginNet
 from feasibility.classifier.margin.prediction import LegPrediction
 from feasibility.errors import InputError
@@ -66,7 +66,7 @@ class MarginEstimator:
             mass = artefact.section("final_mass")
             self._final_mass = MarginNet(mass) if mass else None
             # Models of older versions were not calibrated.
-            self._error_factor = float(mass.get("error_factor", 1.0))
+            self._error_fit = np.asarray(mass.get("error_fit", AS_IT_SAYS), dtype=np.float64)
         except KeyError as error:
             raise InputError(f"model: array {error} is missing") from None
 
@@ -161,10 +161,10 @@ class MarginEstimator:
         probability = np.full(len(legs), _UNKNOWN)
         probability[rows] = self._calibration.probability(log_margin[rows], doubt[rows])
         mass, error = np.full(len(legs), np.nan), np.full(len(legs), np.nan)
-        known = (legs, X, log_margin)
+        known = (legs, X, log_margin, doubt)
         if len(rows) < len(legs):
-            known = (legs.take(rows), X[rows], log_margin[rows])
-        mass[rows], error[rows] = final_mass(*known, self._final_mass, self._error_factor)
+            known = (legs.take(rows), X[rows], log_margin[rows], doubt[rows])
+        mass[rows], error[rows] = final_mass(*known, self._final_mass, self._error_fit)
         return LegPrediction(
             margin=np.exp(log_margin),
             margin_error=doubt,

@@ -136,8 +136,36 @@ def _propellant_hint(legs: Legs, X: _Array) -> _Array:
     return hint
 
 
+def log_expected_error(doubt: _Array, margin_error: _Array, fit: _Array) -> _Array:
+    """Return (n,) the logarithm of the error of log(velocity change) that 68 % of legs are within.
+
+    A net is sure of itself where it has learned by heart; legs that it has not seen tell how
+    sure it should be.
+
+    Parameters
+    ----------
+    doubt : (n,) float64
+        Expected error of log(velocity change), by the net.
+    margin_error : (n,) float64
+        That of log(m*/m0).
+    fit : (3,) float64
+        Coefficients of 1 and of the logarithms of both.
+    """
+    logs: _Array = fit[0] + fit[1] * np.log(doubt) + fit[2] * np.log(margin_error)
+    return logs
+
+
+AS_IT_SAYS: Final = np.array([0.0, 1.0, 0.0])
+"""The fit for nets without one."""
+
+
 def final_mass(
-    legs: Legs, X: _Array, log_margin: _Array, net: MarginNet | None, error_factor: float = 1.0
+    legs: Legs,
+    X: _Array,
+    log_margin: _Array,
+    margin_error: _Array,
+    net: MarginNet | None,
+    error_fit: _Array = AS_IT_SAYS,
 ) -> tuple[_Array, _Array]:
     """Return the mass at arrival with least propellant and the error to expect.
 
@@ -146,10 +174,12 @@ def final_mass(
     legs, X, log_margin
         As for `final_mass_inputs`. Where the margin is negative the leg cannot be flown, and the
         answer is what full thrust all the time would leave.
+    margin_error : (n,) float64
+        Expected error of `log_margin`.
     net : MarginNet, optional
         Estimates log(velocity change / the base's); without it, the smaller bound is the answer.
-    error_factor : float
-        What the net's own expectation of its error is multiplied by.
+    error_fit : (3,) float64
+        As for `log_expected_error`.
 
     Returns
     -------
@@ -163,23 +193,22 @@ def final_mass(
         return mass, error
     if len(rows) < len(legs):
         legs, X, log_margin, most = legs.take(rows), X[rows], log_margin[rows], most[rows]
+        margin_error = margin_error[rows]
     if net is None:
         full = full_thrust_velocity(legs, np.maximum(log_margin, 0.0))
         change, doubt = np.minimum(full, lambert_velocity(legs, X)), np.full(len(rows), np.nan)
     else:
         change, doubt = _corrected(legs, X, log_margin, net)
+        doubt = np.exp(log_expected_error(doubt, margin_error, error_fit))
     # More than full thrust all the time cannot be burnt.
     left = np.maximum(legs.m0 * np.exp(-change / legs.exhaust_velocity), most)
     mass[rows] = np.where(log_margin < 0.0, most, left)
-    error[rows] = mass[rows] * np.minimum(
-        error_factor * doubt * change / legs.exhaust_velocity, 1.0
-    )
+    share = np.minimum(doubt * change / legs.exhaust_velocity, 1.0)
+    error[rows] = legs.m0 * np.exp(-change / legs.exhaust_velocity) * share
     return mass, error
 
 
-def _corrected(
-    legs: Legs, X: _Array, log_margin: _Array, net: MarginNet
-) -> tuple[_Array, _Array]:
+def _corrected(legs: Legs, X: _Array, log_margin: _Array, net: MarginNet) -> tuple[_Array, _Array]:
     """Return (n,) m/s, the velocity change, and the expected error of its logarithm."""
     if net.inputs == len(BOUND_INPUTS):
         # A model from before the hint.

@@ -79,9 +79,7 @@ def least_impulses(
             least = _LEAST_WEIGHT * total / N_NODES
             for i in range(N_NODES):
                 dual = g[3 * N_NODES + i] + 1e-9
-                weights[i] = max(
-                    min(weights[i] * dual * math.sqrt(dual), bound[i] / dual), least
-                )
+                weights[i] = max(min(weights[i] * dual * math.sqrt(dual), bound[i] / dual), least)
     return total
 
 
@@ -138,9 +136,7 @@ def propellant_batch(
         for i in range(N_NODES):
             weights[i] = 1.0
         ve, most = exhaust[leg] / speed, push[leg] / speed
-        total = least_impulses(
-            rows, d, ve, most, int(_FIRST_STEPS), p, weights, g, bound, m
-        )
+        total = least_impulses(rows, d, ve, most, int(_FIRST_STEPS), p, weights, g, bound, m)
         if not total < SATURATED:
             continue
         for j in range(4):
@@ -151,9 +147,7 @@ def propellant_batch(
                 path[i] += _DAMPING * (flown[i] - path[i])
             if not gauss_rows(path, tof, N_NODES, rows, anomaly):
                 break
-            total = least_impulses(
-                rows, d, ve, most, int(_NEXT_STEPS), p, weights, g, bound, m
-            )
+            total = least_impulses(rows, d, ve, most, int(_NEXT_STEPS), p, weights, g, bound, m)
             if not total < SATURATED:
                 break
             said[1], said[2], said[3] = said[2], said[3], total

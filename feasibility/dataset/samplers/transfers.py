@@ -1,4 +1,4 @@
-"""Sampler of transfers to, from and between planets and catalogue bodies, of any number of turns."""
+"""Sampler of transfers between planets and catalogue bodies, of any number of turns."""
 
 from typing import Annotated, ClassVar, Final, Literal, final
 
