@@ -11,7 +11,7 @@ from seqsearch.deadline import Deadline
 @final
 @dataclass(frozen=True, kw_only=True)
 class Limits:
-    """What a run may use, sessions before included, and how many processes work on it.
+    """What a run may use, sessions before included, and who works on it.
 
     Parameters
     ----------
@@ -20,7 +20,9 @@ class Limits:
     max_solves : int, optional
         Legs that are given to the solver, the audit's not counted.
     workers : int, optional
-        Processes; default: one a core.
+        Processes; default: one a core. With a scheduler: threads of this process.
+    scheduler : str, optional
+        Address of a Dask scheduler whose workers take the place of processes.
 
     Raises
     ------
@@ -31,6 +33,7 @@ class Limits:
     time_limit_s: float | None = None
     max_solves: int | None = None
     workers: int | None = None
+    scheduler: str | None = None
 
     def __post_init__(self) -> None:
         for option, number in (("--workers", self.workers), ("--max-solves", self.max_solves)):

@@ -9,13 +9,14 @@ from pathlib import Path
 FLOORS = {
     "seqsearch": [
         {"commands": "the command seqsearch, one file a sub-command"},
+        {"report": "a run as one HTML page"},
         {"runs": "run folder, checkpoints, sessions, resuming, fleets"},
         {"beam": "the search: passes, ranks, expanders, frontiers, rankings, scouting"},
         {"polish": "all epochs of a tour at once, other bodies at its ends"},
         {"problems": "one folder a problem, found by entry points; problem files"},
         {"pruning": "pruners by name, pruning of hops, the audit"},
         {"core": "the words: problem contract, nodes, hops, candidates, tree"},
-        {"tours": "what is found: record, files, events, scores, verify, plot"},
+        {"tours": "what is found: record, files, exports, events, scores, verify, plots"},
         {"settings": "[search]", "budget": "when to stop", "deadline": "the clock"},
     ],
     "feasibility": [

@@ -1,7 +1,6 @@
 """The command ``feasibility generate``: check, make the missing shards, report."""
 
 import argparse
-import importlib
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -11,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from feasibility.commands.options import add_common, one_or_more
-from feasibility.errors import InputError, MissingDependencyError
+from feasibility.runtime.cluster import cluster
 from feasibility.runtime.workers import default_workers, worker_pool
 
 if TYPE_CHECKING:
@@ -92,8 +91,8 @@ def run(options: argparse.Namespace) -> int:
     except KeyboardInterrupt:
         print(_unfinished("interrupted", legs - missing + done, legs), file=sys.stderr)
         return 130
-    except BrokenExecutor:
-        print(_unfinished("a worker process died", legs - missing + done, legs), file=sys.stderr)
+    except BrokenExecutor as error:
+        print(_unfinished(str(error), legs - missing + done, legs), file=sys.stderr)
         return 1
     seconds = time.perf_counter() - began
     if done:
@@ -139,16 +138,5 @@ def _executor(workers: int, scheduler: str | None) -> Iterator[tuple[Executor | 
         with worker_pool(max(workers, 1)) as pool:
             yield pool, 2 * workers
         return
-    try:
-        distributed: Any = importlib.import_module("distributed")
-    except ImportError:
-        raise MissingDependencyError(
-            "--scheduler needs dask, which is not installed; pip install 'seqsearch[dask]'"
-        ) from None
-    try:
-        client = distributed.Client(scheduler, timeout=5)
-    except (OSError, ValueError) as error:
-        raise InputError(f"--scheduler {scheduler}: no Dask scheduler there ({error})") from None
-    with client:
-        threads = sum(client.nthreads().values())
-        yield client.get_executor(), 2 * max(threads, 1)
+    with cluster(scheduler, ("feasibility",)) as executor:
+        yield executor, 2 * executor.threads

@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
-from feasibility.commands.options import add_common
+from feasibility.commands.options import add_common, one_or_more
 from feasibility.errors import InputError
 
 _DESCRIPTION: Final = """\
@@ -24,14 +24,21 @@ more datasets; the learning curve is drawn beside it. "final-mass" adds to such 
 --start, the mass at arrival with least propellant; the rest of the model stays as it is. Its
 datasets have propellant = true in their protocol.
 
+--tune looks for hyperparameters first, those of --set, --epochs and so on being fixed. Its trials
+are kept beside the model, and the same command goes on with them; or in a --storage that the
+same command, started several times and on any number of machines, shares.
+
   feasibility train data/search data/table1 data/general --model margin --out any.seqmodel
   feasibility train data/flown --model final-mass --start any.seqmodel --out whole.seqmodel
   feasibility train data/table1 --preset dnn1 --out dnn1.seqmodel
   feasibility train data/table1 --model ensemble --balance adasyn
+  feasibility train data/table1 --tune 30 --epochs 20 --out tuned.seqmodel
+  feasibility train data/table1 --tune 300 --storage postgresql://user@host/trials
   seqsearch run mission.toml --pruner dnn1.seqmodel:0.99
 """
 
 _MODELS: Final = ("margin", "final-mass", "dnn", "ensemble", "knn", "svm", "tree")
+_TUNABLE: Final = ("dnn", "ensemble", "knn", "svm", "tree")
 _DEFAULT_FEATURES: Final = 60
 
 
@@ -82,6 +89,18 @@ def add_parser(commands: Any) -> None:
     parser.add_argument(
         "--start", metavar="FILE", help='margin model that final-mass is added to, or "default"'
     )
+    parser.add_argument(
+        "--tune",
+        type=one_or_more,
+        metavar="TRIALS",
+        help="find hyperparameters first, in this number of trials",
+    )
+    parser.add_argument(
+        "--storage",
+        metavar="URL",
+        help="where the trials are: sqlite:///FILE, journal:///FILE, postgresql://..., "
+        "mysql://... (default: a journal OUT.trials of this command alone)",
+    )
     add_common(parser, seed="everything", workers=None)
     parser.add_argument(
         "--out", metavar="FILE", help="the model (default: MODEL.seqmodel, or PRESET.seqmodel)"
@@ -105,6 +124,10 @@ def run(options: argparse.Namespace) -> int:
         raise InputError(f"--out {out}: no folder {out.parent}")
     if (name == "final-mass") != (options.start is not None):
         raise InputError("--start: goes with --model final-mass, which needs it")
+    if options.storage is not None and options.tune is None:
+        raise InputError("--storage: goes with --tune")
+    if options.tune is not None and (options.preset is not None or name not in _TUNABLE):
+        raise InputError(f"--tune: is for --model {', '.join(_TUNABLE)}, not for {name}")
     if name == "margin":
         return _train_margin(options, out)
     if name == "final-mass":
@@ -226,10 +249,11 @@ def _train(options: argparse.Namespace, name: str, out: Path) -> int:
         balance=options.balance,
         seed=options.seed,
     )
+    dataset = read_dataset(options.dataset[0])
+    if options.tune is not None:
+        recipe = _tuned(options, dataset, recipe, out)
     checkpoint = out.with_name(out.name + ".checkpoint")
-    artefact = train(
-        read_dataset(options.dataset[0]), recipe, checkpoint=checkpoint, on_epoch=_print_epoch
-    )
+    artefact = train(dataset, recipe, checkpoint=checkpoint, on_epoch=_print_epoch)
     artefact.save(out)
     checkpoint.unlink(missing_ok=True)
     legs = artefact.config["legs"]
@@ -242,6 +266,34 @@ def _train(options: argparse.Namespace, name: str, out: Path) -> int:
     print("validation: " + ", ".join(f"{measure} {measures[measure]:.4f}" for measure in shown))
     print(f"wrote {out}")
     return 0
+
+
+def _tuned(options: argparse.Namespace, dataset: Any, recipe: Any, out: Path) -> Any:
+    from feasibility.learning.paper.tuned import tuned
+
+    best = tuned(
+        dataset,
+        recipe,
+        options.storage or out.with_name(out.name + ".trials"),
+        n_trials=options.tune,
+        on_trial=_print_trial,
+    )
+    found = {
+        name: value
+        for name, value in best.hyperparameters.items()
+        if name not in recipe.hyperparameters
+    }
+    print("best: " + ", ".join(f"{name} {_shown(value)}" for name, value in found.items()))
+    return best
+
+
+def _print_trial(trial: Any) -> None:
+    outcome = f"accuracy {trial.value:.4f}" if trial.state == "complete" else trial.state
+    print(f"trial {trial.number:>3}: {outcome}, {trial.seconds:.1f} s", flush=True)
+
+
+def _shown(value: Any) -> str:
+    return f"{value:.3g}" if isinstance(value, float) else str(value)
 
 
 def _hyperparameters(options: argparse.Namespace, *, network: bool) -> dict[str, Any]:

@@ -13,6 +13,7 @@ from feasibility.constants import DAY_S, MU_SUN
 from feasibility.errors import InputError
 from feasibility.orbits.classical import perifocal_axes
 from feasibility.quantities import plain_numbers
+from feasibility.runtime.text_column import TextColumn, taken_texts
 
 _ELEMENT_UNITS: Final = ("m", "", "rad", "rad", "rad", "rad")
 
@@ -31,7 +32,8 @@ class Catalogue:
     ids : array_like
         (n,) int64, all different.
     names : sequence of str
-        n names, for people; they need not differ.
+        n names, for people; they need not differ. Kept as a tuple, or as the `TextColumn` that
+        was given.
     epoch_mjd2000 : array_like
         (n,) float64, or one value for all: epoch of the elements.
     elements : array_like
@@ -59,7 +61,7 @@ class Catalogue:
     """
 
     ids: NDArray[np.int64]
-    names: tuple[str, ...]
+    names: Sequence[str]
     epoch_mjd2000: NDArray[np.float64]
     elements: NDArray[np.float64]
     source: str
@@ -98,7 +100,8 @@ class Catalogue:
         for array in (id_column, epochs, element_rows, *columns.values()):
             array.flags.writeable = False
         object.__setattr__(self, "ids", id_column)
-        object.__setattr__(self, "names", tuple(str(name) for name in names))
+        texts = names if isinstance(names, TextColumn) else tuple(str(name) for name in names)
+        object.__setattr__(self, "names", texts)
         object.__setattr__(self, "epoch_mjd2000", epochs)
         object.__setattr__(self, "elements", element_rows)
         object.__setattr__(self, "source", source)
@@ -254,7 +257,7 @@ class Catalogue:
         index = self._checked_rows(rows)
         return Catalogue(
             ids=self.ids[index],
-            names=[self.names[row] for row in index],
+            names=taken_texts(self.names, index),
             epoch_mjd2000=self.epoch_mjd2000[index],
             elements=self.elements[index],
             source=self.source,

@@ -31,26 +31,27 @@ names and orbits (group, mass) is in the catalogue's `extra` by the column's nam
 are skipped; files may be gzipped.
 """
 
-import datetime
 import warnings
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 from typing import Final
 
-import numpy as np
-from numpy.typing import NDArray
-
-from feasibility.constants import AU, MJD2000_MJD
 from feasibility.errors import InputError
 from feasibility.orbits.catalogue import Catalogue
-from feasibility.orbits.readers.columns import ANGLES, FURTHER, NEEDED, ORBIT
-from feasibility.orbits.readers.header import Header, find_header
-from feasibility.orbits.readers.horizons import horizons_table
-from feasibility.orbits.readers.mpcorb import is_mpcorb, mpcorb_rows
-from feasibility.orbits.readers.rows import Row, read_rows, takes_julian_dates
-from feasibility.orbits.readers.text import read_lines
+from feasibility.orbits.readers.astdys import astdys_bodies, is_astdys
+from feasibility.orbits.readers.bodies import BodyTable
+from feasibility.orbits.readers.cache import cached_table
+from feasibility.orbits.readers.columns import ORBIT
+from feasibility.orbits.readers.header import SEPARATORS
+from feasibility.orbits.readers.header_table import header_bodies
+from feasibility.orbits.readers.horizons import horizons_bodies, is_horizons
+from feasibility.orbits.readers.json_text import is_json
+from feasibility.orbits.readers.mpc_json import mpc_json_bodies
+from feasibility.orbits.readers.mpcorb import is_mpcorb, mpcorb_bodies
+from feasibility.orbits.readers.sbdb import sbdb_bodies
+from feasibility.orbits.readers.text import read_bytes, text_lines, unpacked
+from feasibility.orbits.selection import selected_bodies
 
 _NODE_LAST: Final = ("epoch", "a", "e", "i", "argp", "node", "M")
 _KNOWN: Final = {
@@ -63,142 +64,129 @@ _KNOWN: Final = {
 }
 """Layouts by their columns, for messages."""
 
+_ALL_BOUND: Final = ("GTOC2", "GTOC4", "GTOC5", "GTOC7")
+"""Tables of asteroids alone: an orbit that is no ellipse is damage there."""
+
 _EARTH_GROUP: Final = 5.0
-_MJD_1950: Final = 33_282.0
-_LEAST_ROWS: Final = 3
-"""Rows from which a table is asked about radians."""
 
 
-def read_catalogue(path: str | PathLike[str]) -> Catalogue:
+def read_catalogue(
+    path: str | PathLike[str],
+    *,
+    units: Mapping[str, str] | None = None,
+    select: str | None = None,
+) -> Catalogue:
     """Read an asteroid table.
 
     What is odd, but not surely wrong, is warned about: angles that look like radians, names that
     are no UTF-8, Julian dates under a header that does not say so, rows that are left out as they
-    lack an element.
+    lack an element or are no ellipse.
 
     Parameters
     ----------
     path : path-like
         The table, as its publishers wrote it (any line ends, also gzipped).
+    units : mapping of str to str, optional
+        Units of columns whose header does not tell them, such as ``{"i": "rad"}``.
+    select : str, optional
+        Which bodies are wanted, see `feasibility.orbits.selection.selected`; all by default.
 
     Returns
     -------
     Catalogue
-        The asteroids in the order of the file; `source` is the path, `extra` has the
-        columns ``group`` and ``mass`` in kg, where the table has them.
+        The asteroids in the order of the file; `source` is the path, `extra` has what else the
+        table tells of them.
 
     Raises
     ------
     InputError
         The file cannot be read, is not text, is empty or in an unknown layout;
         or a line has a wrong number of columns, something that is not a
-        finite number, a value out of range, or an id seen before. The message
-        names the file, the line and what was expected.
+        finite number, a value out of range, or an id seen before; or the selection cannot be
+        understood or is empty. The message names the file, the line and what was expected.
     """
     file = Path(path)
-    lines: Sequence[str] = read_lines(file)
-    header = None
-    name = None
-    if is_mpcorb(lines):
-        rows, label = mpcorb_rows(file, lines), "MPCORB"
-    else:
-        _check_other(file, lines)
-        horizons = horizons_table(file, lines)
-        if horizons is not None:
-            lines, name = horizons
-        header = find_header(file, lines, _KNOWN, quoted=_quoted(lines))
-        rows, label = read_rows(file, lines, header), header.label
-    kept = list(_kept(file, rows, name))
-    bodies = [row for _, row in kept]
-    if not bodies:
-        raise InputError(f"{file}: the table is empty; expected rows of {label} after the header")
-    table = np.array([[row.values[column] for column in NEEDED] for row in bodies])
-    if header is not None:
-        _warn(file, lines, header, table)
-    elements = np.column_stack([table[:, 1] * AU, table[:, 2], np.radians(table[:, 3:])])
-    return Catalogue(
-        [identity for identity, _ in kept],
-        [row.name or str(identity) for identity, row in kept],
-        table[:, 0] - MJD2000_MJD,
-        elements,
-        source=str(file),
-        extra={
-            column: [row.values[column] for row in bodies]
-            for column in FURTHER
-            if column in bodies[0].values
-        },
+    bodies = read_bodies(file, units=units)
+    for note in bodies.notes:
+        warnings.warn(f"{file}{note}", stacklevel=2)
+    if bodies.left_out:
+        count = sum(part.count for part in bodies.left_out)
+        warnings.warn(
+            f"{file}: {count} of {bodies.total} rows lack an element of an ellipse and are left "
+            f"out: {', '.join(map(str, bodies.left_out))}",
+            stacklevel=2,
+        )
+    if select is not None:
+        bodies = selected_bodies(bodies, select, str(file))
+    return bodies.catalogue(str(file))
+
+
+def read_bodies(path: str | PathLike[str], *, units: Mapping[str, str] | None = None) -> BodyTable:
+    """Read an asteroid table as it is: in its own units, with what was left out and why.
+
+    A large table is kept in the user's cache folder, from where it is read in a fraction of the
+    time; see `feasibility.orbits.readers.cache`.
+
+    Parameters
+    ----------
+    path, units
+        As for `read_catalogue`.
+
+    Raises
+    ------
+    InputError
+        As `read_catalogue`.
+    """
+    file = Path(path)
+    data = read_bytes(file)
+    given = dict(units or {})
+    with cached_table(data, given) as cached:
+        if cached.table is None:
+            cached.table = _read(file, unpacked(file, data), given)
+        return cached.table
+
+
+def _read(file: Path, data: bytes, units: dict[str, str]) -> BodyTable:
+    """Read the content of a file by the first format that knows it."""
+    if is_json(data):
+        return _of_fixed_units(file, _read_json(file, data), units)
+    if is_mpcorb(data):
+        return _of_fixed_units(file, mpcorb_bodies(file, data), units)
+    lines, notes = text_lines(file, data)
+    begin = next(line.strip() for line in lines if line.strip())
+    if begin.startswith("<"):
+        raise InputError(f"{file}: is XML or a web page; expected a table as plain text")
+    if is_horizons(lines):
+        return _of_fixed_units(file, horizons_bodies(file, lines, notes), units)
+    if is_astdys(lines):
+        return _of_fixed_units(file, astdys_bodies(file, lines, notes), units)
+    return header_bodies(
+        file,
+        lines,
+        known=_KNOWN,
+        quoted=_quoted(lines),
+        all_bound=lambda header: header.label in _ALL_BOUND and header.separator not in SEPARATORS,
+        skipped=lambda row: row.values.get("group") == _EARTH_GROUP,
+        units=units,
+        notes=notes,
     )
+
+
+def _read_json(file: Path, data: bytes) -> BodyTable:
+    if data.lstrip().startswith(b"["):
+        return mpc_json_bodies(file, data)
+    return sbdb_bodies(file, data)
+
+
+def _of_fixed_units(file: Path, bodies: BodyTable, units: dict[str, str]) -> BodyTable:
+    if units:
+        raise InputError(
+            f"{file}: units of {', '.join(map(repr, units))} are given, but {bodies.label} has "
+            "units of its own; expected none"
+        )
+    return bodies
 
 
 def _quoted(lines: Sequence[str]) -> tuple[str, ...]:
     """Return the layouts whose names are quoted: GTOC4, told from other tables by its header."""
     return ("GTOC4",) if any("arg. periap." in line.lower() for line in lines[:20]) else ()
-
-
-def _check_other(file: Path, lines: Sequence[str]) -> None:
-    """Name formats that are known, but not read."""
-    begin = next(line.strip() for line in lines if line.strip())
-    if begin.startswith(("{", "[{", "[")) and not begin.startswith("[]"):
-        raise InputError(f"{file}: is JSON; expected a table, such as the MPC's MPCORB.DAT")
-    if begin.startswith("<"):
-        raise InputError(f"{file}: is XML or a web page; expected a table as plain text")
-
-
-def _kept(file: Path, rows: Iterator[Row | None], name: str | None) -> Iterator[tuple[int, Row]]:
-    """Yield the asteroids, each with an id of its own; tell how many rows were left out."""
-    line_of_id: dict[int, int] = {}
-    left_out = 0
-    for row in rows:
-        if row is None:
-            left_out += 1
-            continue
-        if row.values.get("group") == _EARTH_GROUP:
-            continue
-        identity = len(line_of_id) + 1 if row.identity is None else row.identity
-        if identity in line_of_id:
-            raise InputError(
-                f"{file}, line {row.line}: id {identity} was given to line "
-                f"{line_of_id[identity]} already; expected different ids"
-            )
-        line_of_id[identity] = row.line
-        yield identity, row if name is None else replace(row, name=name)
-    if left_out:
-        warnings.warn(
-            f"{file}: {left_out} of {left_out + len(line_of_id)} rows lack an element of an "
-            "ellipse and are left out",
-            stacklevel=4,
-        )
-
-
-def _date(mjd: float) -> str:
-    return datetime.date.fromordinal(int(mjd) + 678_576).isoformat()
-
-
-def _warn(file: Path, lines: Sequence[str], header: Header, table: NDArray[np.float64]) -> None:
-    degrees = any(column.unit for column in header.columns if column.meaning in ANGLES)
-    angles = np.abs(table[:, 3:])
-    if (
-        not degrees
-        and len(table) >= _LEAST_ROWS
-        and angles.max() <= 2.0 * np.pi
-        and angles.max() > 0.0
-    ):
-        warnings.warn(
-            f"{file}: all angles are within 0 to 2 pi and are read as degrees; if they are "
-            "radians, write i(rad), node(rad), argp(rad) and M(rad) in the header",
-            stacklevel=3,
-        )
-    silent = any(column.meaning == "epoch" and not column.unit for column in header.columns)
-    if silent and table[:, 0].min() < _MJD_1950:
-        day = table[:, 0].min()
-        warnings.warn(
-            f"{file}: epoch {day:g} is read as MJD, {_date(day)}; if it is another count of days, "
-            "write epoch(MJD2000) or epoch(JD) in the header",
-            stacklevel=3,
-        )
-    if silent and takes_julian_dates(lines, header):
-        warnings.warn(
-            f"{file}: the epochs are read as Julian dates: {table[0, 0] + 2_400_000.5:.10g} is "
-            f"MJD {table[0, 0]:.10g}",
-            stacklevel=3,
-        )

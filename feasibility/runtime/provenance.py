@@ -1,6 +1,7 @@
 """Where a result came from: versions, platform and git commit, written beside every output."""
 
 import platform
+import re
 import subprocess
 import sys
 from datetime import UTC, datetime
@@ -15,7 +16,8 @@ _PACKAGES = ("seqsearch", *_LIBRARIES)
 def provenance() -> dict[str, Any]:
     """Return versions of Python and packages, platform, time, command and git commit.
 
-    Absolute paths in the command are cut to their last name, as folders tell about a machine only.
+    Absolute paths in the command are cut to their last name, as folders tell about a machine
+    only; so are paths and passwords of URLs.
     The commit is that of this project's own checkout, None outside one; a
     trailing ``+`` says that tracked files had been changed.
     """
@@ -31,9 +33,14 @@ def provenance() -> dict[str, Any]:
 
 def _without_folder(word: str) -> str:
     option, equals, value = word.partition("=")
+    if equals and option.startswith("-"):
+        return f"{option}={_without_folder(value)}"
     if equals and Path(value).is_absolute():
         return f"{option}={Path(value).name}"
-    return Path(word).name if Path(word).is_absolute() else word
+    if Path(word).is_absolute():
+        return Path(word).name
+    url = re.sub(r"(://[^/:@]*):[^@]*@", r"\1:***@", word)
+    return re.sub(r"^([\w+]+:///).*/", r"\1", url)
 
 
 def _version(package: str) -> str | None:

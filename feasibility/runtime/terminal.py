@@ -3,7 +3,7 @@
 import json
 import os
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from enum import IntEnum
 from typing import Any, Final
@@ -37,7 +37,7 @@ def say(text: str = "", level: Level = Level.RESULTS) -> None:
         _print(text)
 
 
-def say_json(record: Mapping[str, Any]) -> None:
+def say_json(record: Mapping[str, Any] | Sequence[Any]) -> None:
     """Print a result for programs, whatever the level."""
     _print(json.dumps(record, indent=1))
 

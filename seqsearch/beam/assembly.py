@@ -9,6 +9,7 @@ import numpy as np
 from feasibility import AllOf, Pruner
 from feasibility.classifier.predictor import LegPredictor
 from feasibility.orbits import OrbitalNeighbours
+from feasibility.pruners import quick_check
 from seqsearch.beam.auditing import Auditor, make_auditor
 from seqsearch.beam.best_tour import BestTour
 from seqsearch.beam.expanders.make import make_expander
@@ -166,6 +167,7 @@ def assemble(
     check_possible(problem, settings)
     pruner = pruner or parse_pruner(settings.pruner)
     pruner = pruner if isinstance(pruner, AllOf) else AllOf(pruner)
+    quick_check(pruner)
     predictor = predictor or predictor_of(pruner)
     timed = budget.deadline.remaining_s() is not None
     pacing = ClockPacing(problem, budget.deadline, settings) if timed else FixedPacing()

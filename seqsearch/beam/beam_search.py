@@ -1,15 +1,17 @@
 """`search`: the beam search itself."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import Executor
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility import Pruner
+from feasibility import InputError, Pruner
 from feasibility.classifier.predictor import LegPredictor
+from feasibility.runtime.workers import worker_pool
 from seqsearch.beam.assembly import Beam, OwnParts, Tools, assemble
 from seqsearch.beam.counters import RankCounters
 from seqsearch.beam.expanders.protocol import MakeExpander
@@ -39,7 +41,8 @@ def search(
     expander: MakeExpander | None = None,
     rng: np.random.Generator | None = None,
     executor: Executor | None = None,
-    threads: int = 1,
+    workers: int | None = None,
+    threads: int | None = None,
     time_limit_s: float | None = None,
     max_solves: int | None = None,
     resume: SearchState | None = None,
@@ -54,8 +57,7 @@ def search(
     pruner : Pruner, optional
         Which candidate legs are worth optimising; default: the one that `settings` name.
     predictor : LegPredictor, optional
-        Finds flight times and tells which hops are worth optimising; default:
-        the classifier of the pruner, if that has one.
+        Finds flight times, tells which hops are worth optimising; default: the pruner's, if any.
     audit_predictor : LegPredictor, optional
         Sorts the pruned hops for the audit; default: `predictor`.
     beam_width : int, optional
@@ -71,9 +73,12 @@ def search(
         Draws the start epochs; default: seed 0. The same seed gives the same
         result with any executor, unless a time limit cuts the search short.
     executor : concurrent.futures.Executor, optional
-        Where legs are optimised; default: this process.
-    threads : int
-        Threads of this process that ask the predictor.
+        Where legs are optimised, if you bring your own; default: `workers`.
+    workers : int, optional
+        Processes that optimise legs, started and ended by the search; default: 1, this one.
+        With more, a script searches under ``if __name__ == "__main__":``, as each imports it.
+    threads : int, optional
+        Threads of this process that ask the predictor; default: as many as `workers`.
     time_limit_s : float, optional
         Stop after this wall-clock time, sessions before included, with the best tour so far.
         Passes beyond ``settings.passes`` are then run until the time is up.
@@ -89,43 +94,58 @@ def search(
     Returns
     -------
     SearchResult
-        The best tour and the whole tree. An interrupt from the keyboard ends the search early
-        and is no error.
+        The best tour and the whole tree. Ctrl-C ends the search early and is no error.
 
     Raises
     ------
     InputError
-        Settings that do not fit the problem, or a pruner specification that cannot be read.
+        Settings that do not fit the problem, an unreadable pruner, `workers` and an executor.
     PrunerContractError
         The pruner raised, or returned something else than a boolean a leg.
     BrokenExecutor
-        The workers of `executor` died.
+        Workers died again and again, or those of `executor` died.
     """
-    settings = settings or SearchSettings()
-    settings = settings if beam_width is None else settings.with_(beam_width=beam_width)
+    settings = _with_width(settings or SearchSettings(), beam_width)
     rng = rng or np.random.default_rng(0)
     state = resume or SearchState(settings=settings)
     if resume is not None:
         rng.bit_generator.state = resume.rng_state
-    tools = assemble(
-        problem,
-        settings,
-        pruner=pruner,
-        predictor=predictor,
-        audit_predictor=audit_predictor,
-        own=OwnParts(ranking, frontier, expander),
-        rng=rng,
-        executor=executor,
-        threads=threads,
-        budget=Budget(time_limit_s, max_solves, spent_s=state.spent_s, solves=state.solves),
-    )
-    try:
+    stopped = "interrupted"
+    with suppress(KeyboardInterrupt), _at_work(executor, workers) as at_work:
+        tools = assemble(
+            problem,
+            settings,
+            pruner=pruner,
+            predictor=predictor,
+            audit_predictor=audit_predictor,
+            own=OwnParts(ranking, frontier, expander),
+            rng=rng,
+            executor=at_work,
+            threads=threads or workers or 1,
+            budget=Budget(time_limit_s, max_solves, spent_s=state.spent_s, solves=state.solves),
+        )
         _run(tools, state, on_rank or (lambda _: None))
         stopped = tools.budget.ending()
-    except KeyboardInterrupt:
-        stopped = "interrupted"
     tour = record_tour(problem, state.tree, state.best_node, state.closing)
     return SearchResult(tour, state.tree, state.counters, stopped)
+
+
+def _with_width(settings: SearchSettings, beam_width: int | None) -> SearchSettings:
+    return settings if beam_width is None else settings.with_(beam_width=beam_width)
+
+
+@contextmanager
+def _at_work(executor: Executor | None, workers: int | None) -> Iterator[Executor | None]:
+    """Yield the caller's executor, or a pool of our own where a number of workers is given."""
+    if executor is not None and workers is not None:
+        raise InputError(f"search: workers = {workers} and an executor; expected one of them")
+    if workers is not None and workers < 1:
+        raise InputError(f"search: workers = {workers}, expected one or more")
+    if workers is None:
+        yield executor
+        return
+    with worker_pool(workers) as pool:
+        yield pool
 
 
 def _run(tools: Tools, state: SearchState, on_rank: Callable[[SearchState], None]) -> None:
@@ -154,6 +174,7 @@ def _run_rank(tools: Tools, beam: Beam, state: SearchState) -> None:
     began = time.perf_counter()
     settings = beam.guide.settings(state.settings)
     nodes = beam.frontier.pop(settings.beam_width)
+    nodes = tools.pacing.narrowed(beam.guide, nodes, state.counters)
     counters = RankCounters(
         pass_number=state.pass_number, rank=int(nodes.depth.max()) + 1, nodes=len(nodes)
     )

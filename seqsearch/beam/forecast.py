@@ -6,7 +6,7 @@ time, and one good answer at the curve's crossing of 1 corrects it. From there o
 times are free: the shortest that can be flown, and longer ones, which save propellant.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Final, final
 
@@ -26,6 +26,9 @@ from seqsearch.core.problem import Problem
 from seqsearch.settings import SearchSettings
 
 _Array = NDArray[np.float64]
+
+Allows = Callable[[Nodes, NDArray[np.intp], NDArray[np.intp]], NDArray[np.bool_]]
+"""Tells which hops of nodes, given by positions of parents and rows of targets, are looked at."""
 
 _PAIRS_AT_ONCE: Final = 10_000
 """Pairs of node and target looked at by one thread at once: bounds memory."""
@@ -121,11 +124,13 @@ class Forecast:
         self._threads = threads
         self._quick = quick_margin_of(predictor)
 
-    def surveys(self, nodes: Nodes, settings: SearchSettings) -> Iterator[Survey]:
+    def surveys(
+        self, nodes: Nodes, settings: SearchSettings, allows: Allows | None = None
+    ) -> Iterator[Survey]:
         """Look at the targets of nodes: nearest bodies x departure delays.
 
         Bodies visited before are left out, and so are first departures outside
-        the problem's window. Blocks come in order of the nodes.
+        the problem's window, and what `allows` forbids. Blocks come in order of the nodes.
         """
         per_node = (settings.neighbours + int(nodes.depth.max(initial=0))) * len(
             settings.departure_delays_days
@@ -135,6 +140,9 @@ class Forecast:
             self._pairs(nodes, np.arange(first, min(first + step, len(nodes))), settings)
             for first in range(0, len(nodes), step)
         )
+
+        if allows is not None:
+            blocks = (pairs.take(allows(nodes, pairs.parent, pairs.target)) for pairs in blocks)
 
         def survey(pairs: Pairs) -> Survey:
             return self._survey(nodes, pairs, settings)

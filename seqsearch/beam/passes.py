@@ -81,8 +81,8 @@ class Passes:
             state.pass_number += 1
             # What was loaded at the end of a pass still names the guide of that pass.
             state.guide = None
-            self._set_effort(state)
-            scouted = self._scouting.guide(state, self._rng)
+            narrow = self._set_effort(state)
+            scouted = not narrow and self._scouting.guide(state, self._rng)
             if self._budget.used_up():
                 return
             nodes = self._planted(self._start_nodes(state), state)
@@ -93,10 +93,16 @@ class Passes:
     def _wanted(self, state: SearchState) -> bool:
         return self._budget.limited or state.pass_number < self._count
 
-    def _set_effort(self, state: SearchState) -> None:
+    def _set_effort(self, state: SearchState) -> bool:
+        """Set the settings of a pass, and tell whether it is a narrow one amid scouted ones."""
+        scouted = self._scouting.active
+        if scouted and (narrow := self._pacing.begin_narrow_pass(state.pass_number)):
+            state.settings = narrow
+            return True
         state.settings = self._pacing.begin_pass(
-            state.pass_number, state.settings, state.counters, scouted=self._scouting.active
+            state.pass_number, state.settings, state.counters, scouted=scouted
         )
+        return False
 
     def _start_nodes(self, state: SearchState) -> Nodes:
         if state.guide is not None:

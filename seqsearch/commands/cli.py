@@ -9,8 +9,20 @@ from typing import Final
 from feasibility import InputError, MissingDependencyError
 from feasibility.runtime.interrupts import interrupt_code, interruptible
 from feasibility.runtime.terminal import end_output
+from feasibility.runtime.warning_lines import warnings_as_lines
 from feasibility.sims_flanagan.fast.compilation import prefer_fast_compilation
-from seqsearch.commands import plot, polish, problems, resume, run, verify
+from seqsearch.commands import (
+    bodies,
+    export,
+    plot,
+    polish,
+    problems,
+    refine,
+    report,
+    resume,
+    run,
+    verify,
+)
 from seqsearch.commands.options import set_output
 
 _DESCRIPTION: Final = """\
@@ -24,10 +36,25 @@ Sims-Flanagan model.
   seqsearch problems                      what else there is
   seqsearch resume runs/demo              go on after an interruption
   seqsearch polish runs/demo              improve its tour
+  seqsearch refine runs/demo              from impulses to continuous thrust
   seqsearch verify runs/demo              check the result independently
+  seqsearch report runs/demo              look at it in a browser
+  seqsearch export runs/demo --to csv --out tour.csv
+  seqsearch bodies MPCORB.DAT             what is in an asteroid table
 """
 
-_COMMANDS: Final = (run, resume, polish, verify, plot, problems)
+_COMMANDS: Final = (
+    run,
+    resume,
+    polish,
+    refine,
+    verify,
+    plot,
+    report,
+    export,
+    problems,
+    bodies,
+)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -39,7 +66,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     prefer_fast_compilation()
     parsed = _parser().parse_args(arguments)
     set_output(parsed)
-    with interruptible():
+    with interruptible(), warnings_as_lines("seqsearch"):
         try:
             return int(parsed.run(parsed))
         except (InputError, MissingDependencyError) as error:

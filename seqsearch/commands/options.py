@@ -16,7 +16,7 @@ _UNITS_S: Final = {"": 1.0, "s": 1.0, "sec": 1.0, "min": 60.0, "m": 60.0, "h": 3
 
 
 def add_limits(command: argparse.ArgumentParser) -> None:
-    """Add the options about when to stop, and the number of processes."""
+    """Add the options about when to stop, and who works."""
     command.add_argument(
         "--time-limit",
         metavar="T",
@@ -59,8 +59,17 @@ def add_catalogue(command: argparse.ArgumentParser) -> None:
 
 
 def add_workers(command: argparse.ArgumentParser) -> None:
-    """Add the number of processes."""
-    command.add_argument("--workers", type=int, help="processes (default: one a core)")
+    """Add who works: the number of processes, or a cluster."""
+    command.add_argument(
+        "--workers",
+        type=int,
+        help="processes (default: one a core); with --scheduler, threads of this process alone",
+    )
+    command.add_argument(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="use a running Dask cluster, such as tcp://host:8786, instead of own processes",
+    )
 
 
 def seconds(duration: str | None, option: str = "--time-limit") -> float | None:

@@ -53,6 +53,7 @@ def _polish(options: argparse.Namespace) -> int:
         time_limit_s=seconds(options.time_limit),
         seed=options.seed,
         workers=options.workers,
+        scheduler=options.scheduler,
         catalogue=options.catalogue,
     )
     return print_result(options, Path(options.path), code)

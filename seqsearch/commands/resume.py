@@ -49,6 +49,7 @@ def _resume(options: argparse.Namespace) -> int:
         time_limit_s=seconds(options.time_limit),
         max_solves=options.max_solves,
         workers=options.workers,
+        scheduler=options.scheduler,
         catalogue=options.catalogue,
     )
     return print_result(options, Path(options.path), code)

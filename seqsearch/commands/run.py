@@ -37,6 +37,9 @@ def add_parser(commands: "Commands") -> None:
     )
     run.add_argument("problem", help="name of a built-in problem, or a TOML file")
     run.add_argument("--catalogue", metavar="FILE", help="asteroid table")
+    run.add_argument(
+        "--select", metavar="EXPR", help="which of its bodies, such as 'a > 2.2 and H < 16'"
+    )
     run.add_argument("--out", metavar="DIR", help="run folder (default: runs/PROBLEM)")
     run.add_argument("--seed", type=int, default=0, help="seed of the search (default: 0)")
     add_limits(run)
@@ -62,12 +65,14 @@ def _run(options: argparse.Namespace) -> int:
     code, folder = run_search(
         options.problem,
         catalogue=options.catalogue,
+        select=options.select,
         out=None if options.out is None else Path(options.out),
         seed=options.seed,
         limits=Limits(
             time_limit_s=seconds(options.time_limit),
             max_solves=options.max_solves,
             workers=options.workers,
+            scheduler=options.scheduler,
         ),
         overrides={
             "beam_width": options.beam_width,
@@ -89,6 +94,7 @@ def run_search(
     limits: Limits,
     overrides: dict[str, Any],
     polish_s: float | None = None,
+    select: str | None = None,
 ) -> tuple[int, Path]:
     """Run a search as the command line asks for it and return exit code and run folder.
 
@@ -103,7 +109,12 @@ def run_search(
         Anything in the input that cannot be used.
     """
     # Imported here: the search and what it needs take a second to load.
-    from seqsearch.problems.problem_file import override, read_config, with_catalogue
+    from seqsearch.problems.problem_file import (
+        override,
+        read_config,
+        with_catalogue,
+        with_selection,
+    )
     from seqsearch.runs.begin import begin_search
     from seqsearch.runs.fleet_run import run_fleet
     from seqsearch.runs.polishing import polish_run
@@ -113,6 +124,8 @@ def run_search(
     config = override(read_config(problem_name), **overrides)
     if catalogue is not None:
         config = with_catalogue(config, catalogue)
+    if select is not None:
+        config = with_selection(config, select)
     if config.catalogue.file is not None:
         # The run folder's copy is read from elsewhere when the run is resumed.
         config = with_catalogue(config, str(Path(config.catalogue.file).absolute()))
@@ -122,5 +135,11 @@ def run_search(
         return code, folder
     code = begin_search(config, folder, seed, limits)
     if code == 0 and polish_s is not None:
-        code = polish_run(folder, time_limit_s=polish_s, seed=seed, workers=limits.workers)
+        code = polish_run(
+            folder,
+            time_limit_s=polish_s,
+            seed=seed,
+            workers=limits.workers,
+            scheduler=limits.scheduler,
+        )
     return code, folder

@@ -6,17 +6,20 @@ the whole is retimed. Tours that are too long for the mission are worked on all
 the same, at their least duration, until one fits.
 """
 
+import functools
+import pickle
 import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
-from typing import Final, final
+from typing import Any, Final, final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from feasibility import InputError
 from feasibility.classifier.predictor import LegPredictor
+from feasibility.runtime.cluster import shared
 from seqsearch.core.problem import Problem
 from seqsearch.deadline import Deadline
 from seqsearch.polish.extension import Extender, Extension, ExtensionSettings
@@ -192,10 +195,8 @@ def polish(
 @final
 @dataclass(frozen=True, eq=False)
 class _Move:
-    """One thing to try, complete with everything that it needs, so that it can travel."""
+    """One thing to try; can travel to another process."""
 
-    problem: Problem
-    predictor: LegPredictor
     origin: Retimed
     extension: Extension
     avoid: NDArray[np.intp]
@@ -208,16 +209,26 @@ class _Move:
         return kept + new > self.origin.flight.itinerary.n_asteroids
 
 
-def try_move(move: _Move) -> Retimed | None:
+@final
+@dataclass(frozen=True, eq=False)
+class _Context:
+    """What all moves have in common."""
+
+    problem: Problem
+    predictor: LegPredictor
+
+
+def _try_move(context: _Context, move: _Move) -> Retimed | None:
     """Rebuild an end of a tour and return the best result, retimed; None if there is none."""
-    extender = Extender(move.problem, move.predictor, move.settings)
+    problem = context.problem
+    extender = Extender(problem, context.predictor, move.settings)
     itineraries = extender.extend(move.origin.flight, move.extension, avoid=move.avoid)
     old = move.origin.flight.itinerary.rows
     found = [
         retimed
         for itinerary in itineraries
         if not np.array_equal(itinerary.rows, old)
-        if (retimed := retime(move.problem, itinerary, max_iterations=_QUICK_ITERATIONS))
+        if (retimed := retime(problem, itinerary, max_iterations=_QUICK_ITERATIONS))
     ]
     if not found:
         return None
@@ -225,7 +236,18 @@ def try_move(move: _Move) -> Retimed | None:
     if not move.grows and best.merit_days > move.origin.merit_days + _HOPELESS_DAYS:
         return None
     iterations = _GROWTH_ITERATIONS if move.grows else _THOROUGH_ITERATIONS
-    return retime(move.problem, best.flight.itinerary, max_iterations=iterations)
+    return retime(problem, best.flight.itinerary, max_iterations=iterations)
+
+
+@functools.lru_cache(maxsize=1)
+def _unpacked(context: bytes) -> _Context:
+    unpacked = pickle.loads(context)
+    assert isinstance(unpacked, _Context)
+    return unpacked
+
+
+def _try_move_there(context: bytes, move: _Move) -> Retimed | None:
+    return _try_move(_unpacked(context), move)
 
 
 @final
@@ -241,7 +263,7 @@ class _Polish:
         on_step: Callable[[PolishStep, Tour], None] | None,
     ) -> None:
         self._problem = problem
-        self._predictor = predictor
+        self._context = _Context(problem, predictor)
         self._settings = settings
         self._deadline = deadline
         self._on_step = on_step
@@ -264,12 +286,15 @@ class _Polish:
         rounds = 0
         try:
             self._retime_given(tours)
+            common = executor and shared(executor, pickle.dumps(self._context))
             while self._pools and not self._deadline.passed():
                 if not endless and rounds == self._settings.rounds:
                     break
                 rounds += 1
                 moves = [self._draw(rng) for _ in range(self._settings.moves_per_round)]
-                for move, found in zip(moves, self._try_all(moves, executor), strict=False):
+                for move, found in zip(
+                    moves, self._try_all(moves, executor, common), strict=False
+                ):
                     self._moves += 1
                     if found is not None:
                         self._keep(found, "growth" if move.grows else "exchange")
@@ -288,15 +313,17 @@ class _Polish:
             if found is not None:
                 self._keep(found, "retimed")
 
-    def _try_all(self, moves: list[_Move], executor: Executor | None) -> Iterator[Retimed | None]:
+    def _try_all(
+        self, moves: list[_Move], executor: Executor | None, common: Any
+    ) -> Iterator[Retimed | None]:
         """Yield the results in the order of the moves, until the time is up."""
         if executor is None:
             for move in moves:
                 if self._deadline.passed():
                     return
-                yield try_move(move)
+                yield _try_move(self._context, move)
             return
-        futures = [executor.submit(try_move, move) for move in moves]
+        futures = [executor.submit(_try_move_there, common, move) for move in moves]
         try:
             for future in futures:
                 if self._deadline.passed() and not future.running() and not future.done():
@@ -376,4 +403,4 @@ class _Polish:
             reference_tof_days=base.reference_tof_days * rng.uniform(0.75, 1.35),
             propellant_days_per_kg=base.propellant_days_per_kg * 2.0 ** rng.uniform(-1.5, 0.5),
         )
-        return _Move(self._problem, self._predictor, origin, extension, avoid, varied)
+        return _Move(origin, extension, avoid, varied)

@@ -13,6 +13,7 @@ from msgspec import Meta
 from feasibility import InputError, Spacecraft
 from feasibility.constants import mjd_to_mjd2000
 from feasibility.orbits import Catalogue, read_catalogue, synthetic_main_belt
+from feasibility.orbits.selection import selected_rows
 from feasibility.runtime.toml_file import convert_table, parse_toml, read_toml_text
 from seqsearch.core.problem import Problem
 from seqsearch.problems.registry import ProblemPlugin, builtin_problems, plugins
@@ -79,10 +80,13 @@ class MissionTable(_Table, frozen=True, kw_only=True):
 class CatalogueTable(_Table, frozen=True, kw_only=True):
     """Table ``[catalogue]``: a file, or a synthetic belt, or neither (then --catalogue).
 
-    Bodies in `exclude_ids` are left out.
+    Of its bodies those are searched that `select` describes, less `exclude_ids`. `units` are those
+    of columns whose header does not tell them.
     """
 
     file: str | None = None
+    units: dict[str, str] = msgspec.field(default_factory=dict)
+    select: str | None = None
     synthetic_bodies: Annotated[int, Meta(ge=2)] | None = None
     synthetic_seed: Annotated[int, Meta(ge=0)] = 0
     exclude_ids: tuple[int, ...] = ()
@@ -218,8 +222,16 @@ def override(config: Config, **changes: Any) -> Config:
 
 
 def with_catalogue(config: Config, file: str) -> Config:
-    """Return the configuration with another catalogue file, less the same bodies."""
-    table = CatalogueTable(file=file, exclude_ids=config.catalogue.exclude_ids)
+    """Return the configuration with another catalogue file, of which the same bodies count."""
+    table = msgspec.structs.replace(
+        config.catalogue, file=file, synthetic_bodies=None, synthetic_seed=0
+    )
+    return msgspec.structs.replace(config, catalogue=table)
+
+
+def with_selection(config: Config, select: str) -> Config:
+    """Return the configuration with another selection of bodies."""
+    table = msgspec.structs.replace(config.catalogue, select=select)
     return msgspec.structs.replace(config, catalogue=table)
 
 
@@ -330,10 +342,11 @@ def _whole_catalogue(config: Config) -> Catalogue:
             "expected one of them"
         )
     if table.file is not None:
-        return read_catalogue(Path(table.file))
+        return read_catalogue(Path(table.file), units=table.units, select=table.select)
     if table.synthetic_bodies is not None:
         rng = np.random.default_rng(table.synthetic_seed)
-        return synthetic_main_belt(table.synthetic_bodies, rng)
+        belt = synthetic_main_belt(table.synthetic_bodies, rng)
+        return belt if table.select is None else selected_rows(belt, table.select)
     raise InputError(
         f"problem {config.problem.name}: no asteroid table; give one with --catalogue FILE "
         "(the README says where the official tables are)"

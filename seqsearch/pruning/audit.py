@@ -25,7 +25,7 @@ from seqsearch.core.nodes import Nodes
 from seqsearch.core.optimisation import LegOptimiser
 from seqsearch.core.problem import Problem
 from seqsearch.deadline import Deadline
-from seqsearch.pruning.audit_estimate import RankAudit, Stratum
+from seqsearch.pruning.audit_estimate import AuditedHop, RankAudit, Stratum
 
 _THINNED: Final = 10_000
 """Pruned candidates of a rank whose margins are predicted: a fraction of a second."""
@@ -51,11 +51,15 @@ _QUICK_DOUBT: Final = 0.8
 @final
 @dataclass(frozen=True, eq=False)
 class _Group:
-    """Candidates drawn at random from a stratum, and the number that they were drawn from."""
+    """Candidates drawn at random from a stratum, and the number that they were drawn from.
+
+    With n drawn, `margin` is (n,) m*/m0 as predicted, NaN where nothing is known.
+    """
 
     label: str
     population: float
     drawn: Candidates
+    margin: NDArray[np.float64]
     far: bool = False
 
 
@@ -221,38 +225,46 @@ class RankSample:
             )
             for group, end in zip(groups, ends, strict=True)
         )
-        return RankAudit(pruned=strata[: len(pruned)], kept=strata[len(pruned) :])
+        return RankAudit(
+            pruned=strata[: len(pruned)],
+            kept=strata[len(pruned) :],
+            hops=_one_by_one(groups, n_pruned, solved.flyable),
+        )
 
     def _pruned_groups(self) -> list[_Group]:
         """Sort the pruned candidates by predicted margin and draw from each stratum."""
         thinned = self._pruned.candidates
         if thinned is None:
             return []
-        strata = self._strata(thinned)
+        margin = self._margins(thinned)
+        strata = _strata(margin)
         members = [np.flatnonzero(strata == s) for s in range(len(_LABELS))]
         wanted = _allot(np.array([len(rows) for rows in members]), self._solves)
         stands_for = self._stands_for * self._pruned.seen / len(thinned)
-        return [
-            _Group(label, stands_for * len(rows), thinned.take(self._draw(rows, n)), s == _FAR)
-            for s, (label, rows, n) in enumerate(zip(_LABELS, members, wanted, strict=True))
-            if n
-        ]
+        groups = []
+        for s, (label, members_of, n) in enumerate(zip(_LABELS, members, wanted, strict=True)):
+            if n:
+                rows = self._draw(members_of, n)
+                population = stands_for * len(members_of)
+                drawn = thinned.take(rows)
+                groups.append(_Group(label, population, drawn, margin[rows], s == _FAR))
+        return groups
 
-    def _strata(self, candidates: Candidates) -> NDArray[np.intp]:
-        """Return the number of each candidate's stratum."""
-        strata = np.full(len(candidates), _UNKNOWN)
+    def _margins(self, candidates: Candidates) -> NDArray[np.float64]:
+        """Return (n,) m*/m0 of candidates as predicted; NaN where nothing is known."""
         if self._predictor is None:
-            return strata
+            return np.full(len(candidates), np.nan)
         margin = least_margin(quick_margin_of(self._predictor), candidates.hops)
         doubtful = np.flatnonzero(margin > _QUICK_DOUBT)
         margin[doubtful] = least_margin(self._predictor.margin, candidates.hops.take(doubtful))
-        known = ~np.isnan(margin)
-        strata[known] = np.searchsorted(_MARGINS, margin[known], "right")
-        return strata
+        return margin
 
     def _kept_groups(self) -> list[_Group]:
         drawn = self._kept.candidates
-        return [] if drawn is None else [_Group("kept", self._stands_for * self._kept.seen, drawn)]
+        if drawn is None:
+            return []
+        population = self._stands_for * self._kept.seen
+        return [_Group("kept", population, drawn, self._margins(drawn))]
 
     def _draw(self, rows: NDArray[np.intp], n: int) -> NDArray[np.intp]:
         return np.sort(self._rng.choice(rows, n, replace=False))
@@ -284,6 +296,33 @@ class _Reservoir:
         if self.candidates is not None:
             parts.insert(0, self.candidates.take(stay[stay < n_before]))
         self.candidates = Candidates.concatenate(parts)
+
+
+def _strata(margin: NDArray[np.float64]) -> NDArray[np.intp]:
+    """Return the number of each candidate's stratum, by its predicted margin."""
+    known = ~np.isnan(margin)
+    strata = np.full(len(margin), _UNKNOWN)
+    strata[known] = np.searchsorted(_MARGINS, margin[known], "right")
+    return strata
+
+
+def _one_by_one(
+    groups: list[_Group], n_pruned: int, flyable: NDArray[np.bool_]
+) -> tuple[AuditedHop, ...]:
+    """Return the records of all that was drawn, of which the first `n_pruned` were pruned."""
+    margin = np.concatenate([group.margin for group in groups])
+    tof_days = np.concatenate(
+        [np.sum([legs.tof_days for legs in group.drawn.hops.legs], axis=0) for group in groups]
+    )
+    return tuple(
+        AuditedHop(
+            kept=k >= n_pruned,
+            tof_days=round(float(days), 2),
+            margin=None if np.isnan(predicted) else round(float(predicted), 4),
+            flyable=bool(flies),
+        )
+        for k, (days, predicted, flies) in enumerate(zip(tof_days, margin, flyable, strict=True))
+    )
 
 
 def _allot(sizes: NDArray[np.intp], solves: int) -> list[int]:

@@ -71,11 +71,38 @@ class Stratum:
 
 @final
 @dataclass(frozen=True, kw_only=True)
+class AuditedHop:
+    """One candidate that was optimised for the audit.
+
+    Attributes
+    ----------
+    kept : bool
+        It was not pruned.
+    tof_days : float
+        Flight time of all its legs.
+    margin : float or None
+        Predicted m*/m0 of its most difficult leg; None where nothing is known.
+    flyable : bool
+        It can be flown.
+    """
+
+    kept: bool
+    tof_days: float
+    margin: float | None
+    flyable: bool
+
+
+@final
+@dataclass(frozen=True, kw_only=True)
 class RankAudit:
-    """The audit of one rank: strata of the pruned and of the kept candidates."""
+    """The audit of one rank: strata of the pruned and of the kept candidates, and what was solved.
+
+    Checkpoints of before there were `hops` are read with none.
+    """
 
     pruned: tuple[Stratum, ...]
     kept: tuple[Stratum, ...]
+    hops: tuple[AuditedHop, ...] = ()
 
     @property
     def solved(self) -> int:

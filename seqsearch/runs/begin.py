@@ -5,9 +5,12 @@ from typing import Final
 
 import numpy as np
 
+from feasibility import AllOf
 from feasibility.constants import YEAR_DAYS
+from feasibility.runtime.cluster import ClusterExecutor, crew
 from feasibility.runtime.locks import folder_lock
 from feasibility.runtime.terminal import Level, say
+from feasibility.runtime.workers import MendingPool, default_workers
 from seqsearch.beam.state import SearchState
 from seqsearch.budget import Limits
 from seqsearch.core.possible import check_possible
@@ -17,7 +20,7 @@ from seqsearch.problems.problem_file import Config, build_problem
 from seqsearch.pruning.pruner_spec import parse_pruner
 from seqsearch.runs.checkpoint import Checkpoints, Origin, catalogue_digest
 from seqsearch.runs.run_folder import RunFolder
-from seqsearch.runs.session import run_session
+from seqsearch.runs.session import PACKAGES, run_session
 from seqsearch.tours.dates import date_of
 
 _OLD_DAYS: Final = 50 * YEAR_DAYS
@@ -30,11 +33,26 @@ def begin_search(config: Config, path: Path, seed: int, limits: Limits) -> int:
     Raises
     ------
     InputError
-        Anything in the configuration that cannot be used, or the folder exists.
+        Anything in the configuration that cannot be used, the folder exists, or no cluster
+        is where `limits` say.
     """
     pruner = parse_pruner(config.search.pruner)
     problem = build_problem(config)
     check_possible(problem, config.search)
+    with crew(limits.workers or default_workers(), limits.scheduler, PACKAGES) as executor:
+        return _begun(config, path, seed, limits, pruner, problem, executor)
+
+
+def _begun(
+    config: Config,
+    path: Path,
+    seed: int,
+    limits: Limits,
+    pruner: AllOf,
+    problem: Problem,
+    executor: MendingPool | ClusterExecutor | None,
+) -> int:
+    """Make the run folder and search; all that can be checked before is checked."""
     folder = RunFolder.create(path, config, seed)
     rng = np.random.default_rng(seed)
     state = SearchState(settings=config.search, rng_state=dict(rng.bit_generator.state))
@@ -63,6 +81,7 @@ def begin_search(config: Config, path: Path, seed: int, limits: Limits) -> int:
             problem=problem,
             pruner=pruner,
             limits=limits,
+            executor=executor,
         )
 
 

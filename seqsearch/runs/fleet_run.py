@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import msgspec
@@ -71,10 +72,9 @@ def run_fleet(
             single,
             sub,
             probe_seed,
-            Limits(
+            replace(
+                limits,
                 time_limit_s=None if share_s is None else (1.0 - polish_share) * share_s,
-                max_solves=limits.max_solves,
-                workers=limits.workers,
             ),
         )
         if code != 0:
@@ -85,6 +85,7 @@ def run_fleet(
                 time_limit_s=None if share_s is None else polish_share * share_s,
                 seed=probe_seed,
                 workers=limits.workers,
+                scheduler=limits.scheduler,
             )
             if code != 0:
                 return code

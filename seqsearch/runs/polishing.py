@@ -1,5 +1,7 @@
 """`polish_run`: reads a run folder, polishes its tours, writes what is better."""
 
+import sys
+from concurrent.futures import BrokenExecutor, Executor
 from dataclasses import asdict
 from pathlib import Path
 from typing import Final
@@ -8,17 +10,19 @@ import numpy as np
 
 from feasibility import InputError
 from feasibility.runtime.atomic import write_json
+from feasibility.runtime.cluster import crew
 from feasibility.runtime.interrupts import interrupt_code
 from feasibility.runtime.locks import folder_lock
 from feasibility.runtime.provenance import provenance
 from feasibility.runtime.terminal import Level, say
-from feasibility.runtime.workers import default_workers, worker_pool
+from feasibility.runtime.workers import default_workers
 from seqsearch.core.problem import Problem
 from seqsearch.polish import PolishResult, PolishStep, distinct_tours, polish
 from seqsearch.problems.problem_file import build_problem, read_config, with_catalogue
 from seqsearch.pruning.pruner_spec import parse_pruner, predictor_of
 from seqsearch.runs.checkpoint import FOLDER, Checkpoints, catalogue_digest
 from seqsearch.runs.run_folder import CONFIG, SEQUENCE, RunFolder, worth
+from seqsearch.runs.session import PACKAGES
 from seqsearch.tours.plots import plot_tour
 from seqsearch.tours.tour import Tour
 from seqsearch.tours.tour_files import read_tour
@@ -36,6 +40,7 @@ def polish_run(
     time_limit_s: float | None,
     seed: int = 0,
     workers: int | None = None,
+    scheduler: str | None = None,
     catalogue: str | None = None,
 ) -> int:
     """Polish the tours of a run folder and return the exit code.
@@ -53,6 +58,8 @@ def polish_run(
         Seed of the moves.
     workers : int, optional
         Processes; default: one a core.
+    scheduler : str, optional
+        Address of a Dask scheduler whose workers take the place of processes.
     catalogue : str, optional
         Where the asteroid table is now; it has to be the same one.
 
@@ -60,7 +67,7 @@ def polish_run(
     ------
     InputError
         No run folder, or one that is damaged; a problem whose tours are more
-        than rendezvous; an asteroid table that is not the same any more.
+        than rendezvous; an asteroid table that is not the same any more; no cluster there.
     """
     if seed < 0:
         raise InputError(f"--seed {seed}: expected zero or more")
@@ -68,12 +75,22 @@ def polish_run(
         raise InputError(f"--workers {workers}: expected one or more")
     if not run.is_dir():
         raise InputError(f"{run}: no such run folder")
-    with folder_lock(run):
-        return _polished(run, time_limit_s, seed, workers or default_workers(), catalogue)
+    working = crew(workers or default_workers(), scheduler, PACKAGES)
+    with folder_lock(run), working as executor:
+        try:
+            return _polished(run, time_limit_s, seed, executor, catalogue)
+        except BrokenExecutor as error:
+            print(f"seqsearch: {error}", file=sys.stderr)
+            print(f"what was gained is saved; again: seqsearch polish {run}", file=sys.stderr)
+            return 1
 
 
 def _polished(
-    run: Path, time_limit_s: float | None, seed: int, workers: int, catalogue: str | None
+    run: Path,
+    time_limit_s: float | None,
+    seed: int,
+    executor: Executor | None,
+    catalogue: str | None,
 ) -> int:
     before = read_tour(run / SEQUENCE)
     folder = RunFolder.open(run)
@@ -101,16 +118,15 @@ def _polished(
         if worth(tour) > worth(before):
             folder.write_polished(tour)
 
-    with worker_pool(workers) as executor:
-        result = polish(
-            problem,
-            tours,
-            predictor=predictor,
-            rng=np.random.default_rng(seed),
-            executor=executor,
-            time_limit_s=time_limit_s,
-            on_step=on_step,
-        )
+    result = polish(
+        problem,
+        tours,
+        predictor=predictor,
+        rng=np.random.default_rng(seed),
+        executor=executor,
+        time_limit_s=time_limit_s,
+        on_step=on_step,
+    )
     _report(run, before, result, seed, time_limit_s)
     if worth(result.tour) > worth(before):
         plot_tour(result.tour, run / "tour.png")

@@ -1,16 +1,19 @@
 """`resume_search`: reads a run folder, checks that it is whole, goes on."""
 
+from dataclasses import replace
 from pathlib import Path
 
 from feasibility import InputError
+from feasibility.runtime.cluster import crew
 from feasibility.runtime.locks import folder_lock
 from feasibility.runtime.terminal import say
+from feasibility.runtime.workers import default_workers
 from seqsearch.budget import Limits
 from seqsearch.problems.problem_file import build_problem, read_config, with_catalogue
 from seqsearch.pruning.pruner_spec import parse_pruner
 from seqsearch.runs.checkpoint import Checkpoints, catalogue_digest
 from seqsearch.runs.run_folder import CONFIG, RunFolder
-from seqsearch.runs.session import run_session
+from seqsearch.runs.session import PACKAGES, run_session
 
 
 def resume_search(
@@ -20,6 +23,7 @@ def resume_search(
     time_limit_s: float | None,
     max_solves: int | None,
     workers: int | None,
+    scheduler: str | None = None,
     catalogue: str | None = None,
 ) -> int:
     """Go on with a run where it stopped, or after a rank of it, and return the exit code.
@@ -36,6 +40,8 @@ def resume_search(
         New budgets for the whole run; default: those that it was begun with.
     workers : int, optional
         Processes.
+    scheduler : str, optional
+        Address of a Dask scheduler whose workers take the place of processes.
     catalogue : str, optional
         Where the asteroid table is now; it has to be the same one.
 
@@ -48,23 +54,31 @@ def resume_search(
     if not run.is_dir():
         raise InputError(f"{run}: no such run folder")
     with folder_lock(run):
-        return _resumed(run, after, time_limit_s, max_solves, workers, catalogue)
+        return _resumed(
+            run,
+            after,
+            Limits(
+                time_limit_s=time_limit_s,
+                max_solves=max_solves,
+                workers=workers,
+                scheduler=scheduler,
+            ),
+            catalogue,
+        )
 
 
 def _resumed(
     run: Path,
     after: tuple[int, int] | None,
-    time_limit_s: float | None,
-    max_solves: int | None,
-    workers: int | None,
+    given: Limits,
     catalogue: str | None,
 ) -> int:
     checkpoints, state = Checkpoints.load(run, after)
     origin = checkpoints.origin
-    limits = Limits(
-        time_limit_s=origin.time_limit_s if time_limit_s is None else time_limit_s,
-        max_solves=origin.max_solves if max_solves is None else max_solves,
-        workers=workers,
+    limits = replace(
+        given,
+        time_limit_s=origin.time_limit_s if given.time_limit_s is None else given.time_limit_s,
+        max_solves=origin.max_solves if given.max_solves is None else given.max_solves,
     )
     if limits.time_limit_s is not None and limits.time_limit_s <= state.spent_s:
         raise InputError(
@@ -90,13 +104,21 @@ def _resumed(
         raise InputError(
             f"{problem.catalogue.source}: not the asteroid table that {run} was begun with"
         )
-    folder.note_session(limits.time_limit_s, limits.max_solves)
-    checkpoints.discard_later()
-    say(
-        f"{problem.name}: {len(problem.catalogue)} bodies from {problem.catalogue.source}, "
-        f"seed {origin.seed}, going on in {run} after pass {state.pass_number}, "
-        f"{len(state.counters)} ranks and {state.spent_s:.0f} s"
-    )
-    return run_session(
-        folder, checkpoints, state, config=config, problem=problem, pruner=pruner, limits=limits
-    )
+    with crew(limits.workers or default_workers(), limits.scheduler, PACKAGES) as executor:
+        folder.note_session(limits.time_limit_s, limits.max_solves)
+        checkpoints.discard_later()
+        say(
+            f"{problem.name}: {len(problem.catalogue)} bodies from {problem.catalogue.source}, "
+            f"seed {origin.seed}, going on in {run} after pass {state.pass_number}, "
+            f"{len(state.counters)} ranks and {state.spent_s:.0f} s"
+        )
+        return run_session(
+            folder,
+            checkpoints,
+            state,
+            config=config,
+            problem=problem,
+            pruner=pruner,
+            limits=limits,
+            executor=executor,
+        )

@@ -6,7 +6,7 @@ import io
 import json
 import os
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Final, Self, final
 
@@ -36,8 +36,20 @@ SEARCHED: Final = "sequence.search.json"
 POLISHED: Final = "sequence.polished.json"
 """Name of the file that keeps the best tour that polishing found."""
 
+_SIDES: Final = ("pruned", "kept")
+
 PROVENANCE: Final = "provenance.json"
 """Name of the file that says where the run came from."""
+
+
+CANDIDATES: Final = "candidates.csv"
+"""Name of the file with the audited candidates one by one: a random sample of each rank."""
+
+COUNTERS: Final = "counters.csv"
+"""Name of the file with what happened at each rank."""
+
+AUDIT: Final = "audit.json"
+"""Name of the file that says what pruning cost."""
 
 
 @final
@@ -46,7 +58,7 @@ class RunFolder:
 
     Use `create` or `open`. The files are ``config.toml`` (resolved),
     ``provenance.json`` (seed, versions, git commit, command), ``counters.csv``,
-    ``audit.json``, ``sequence.json`` and ``sequence.csv``; the last four are
+    ``audit.json``, ``candidates.csv``, ``sequence.json`` and ``sequence.csv``; the last five are
     rewritten after each rank, so an interrupted run leaves its best tour. The stages of
     a tour are kept beside it, as ``sequence.search.json`` and ``sequence.polished.json``.
     """
@@ -136,8 +148,9 @@ class RunFolder:
             write_text(self.path / SEARCHED, to_json(tour))
             if self._polished is None or worth(tour) > worth(self._polished):
                 self._write_best(tour)
-        write_text(self.path / "audit.json", audit_json(counters))
-        write_text(self.path / "counters.csv", counters_csv(counters))
+        write_text(self.path / AUDIT, audit_json(counters))
+        write_text(self.path / CANDIDATES, candidates_csv(counters))
+        write_text(self.path / COUNTERS, counters_csv(counters))
 
     def write_polished(self, tour: Tour) -> None:
         """Write a tour that polishing made better than all before.
@@ -176,14 +189,14 @@ def counters_csv(counters: Sequence[RankCounters]) -> str:
     pruners = list(dict.fromkeys(name for record in counters for name in record.pruned))
     rows = []
     for record in counters:
-        row = asdict(record)
+        row = {field.name: getattr(record, field.name) for field in fields(record)}
         pruned = row.pop("pruned")
         audit = row.pop("audit")
         row |= {f"pruned_{name}": pruned.get(name, 0) for name in pruners}
-        for side in ("pruned", "kept"):
-            strata = [] if audit is None else audit[side]
-            row[f"audited_{side}"] = sum(stratum["solved"] for stratum in strata)
-            row[f"audited_{side}_flyable"] = sum(stratum["flyable"] for stratum in strata)
+        for side in _SIDES:
+            strata = () if audit is None else getattr(audit, side)
+            row[f"audited_{side}"] = sum(stratum.solved for stratum in strata)
+            row[f"audited_{side}_flyable"] = sum(stratum.flyable for stratum in strata)
         row |= {key: round(value, 3) for key, value in row.items() if isinstance(value, float)}
         rows.append(row)
     text = io.StringIO()
@@ -199,9 +212,23 @@ def audit_json(counters: Sequence[RankCounters]) -> str:
     audited = [(record, record.audit) for record in counters if record.audit is not None]
     estimate = asdict(AuditEstimate.of(audit for _, audit in audited))
     ranks = [
-        {"pass": record.pass_number, "rank": record.rank} | asdict(audit)
+        {"pass": record.pass_number, "rank": record.rank}
+        | {side: [asdict(stratum) for stratum in getattr(audit, side)] for side in _SIDES}
         for record, audit in audited
     ]
     # JSON knows no NaN: the rate where no flyable candidate was seen.
     plain = {key: None if value != value else value for key, value in estimate.items()}
     return json.dumps({"estimate": plain, "ranks": ranks}, indent=1, allow_nan=False) + "\n"
+
+
+def candidates_csv(counters: Sequence[RankCounters]) -> str:
+    """Return the audited candidates, one a row: what was decided, predicted and found."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(["pass", "rank", "kept", "tof_days", "predicted_margin", "flyable"])
+    for record in counters:
+        for hop in () if record.audit is None else record.audit.hops:
+            margin = "" if hop.margin is None else hop.margin
+            row = [record.pass_number, record.rank, int(hop.kept), hop.tof_days, margin]
+            writer.writerow([*row, int(hop.flyable)])
+    return text.getvalue()

@@ -3,15 +3,17 @@
 import sys
 from concurrent.futures import BrokenExecutor, Executor
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 
 from feasibility import AllOf, Pruner
 from feasibility.classifier.predictor import LegPredictor
 from feasibility.pruners import PrunerContractError
+from feasibility.runtime.cluster import ClusterExecutor
 from feasibility.runtime.interrupts import interrupt_code
 from feasibility.runtime.terminal import Level, say
-from feasibility.runtime.workers import default_workers, worker_pool
+from feasibility.runtime.workers import MendingPool, default_workers
 from feasibility.sims_flanagan.fast.compilation import compile_kernels, sample_leg
 from seqsearch.beam.beam_search import search
 from seqsearch.beam.result import SearchResult
@@ -27,6 +29,9 @@ from seqsearch.runs.progress import Progress
 from seqsearch.runs.run_folder import RunFolder
 from seqsearch.tours.plots import plot_tour
 
+PACKAGES: Final = ("feasibility", "seqsearch")
+"""What has to be the same on all workers of a cluster."""
+
 
 def run_session(
     folder: RunFolder,
@@ -37,6 +42,7 @@ def run_session(
     problem: Problem,
     pruner: AllOf,
     limits: Limits,
+    executor: MendingPool | ClusterExecutor | None,
 ) -> int:
     """Search from a state to the end, or until a budget is used up, and return the exit code.
 
@@ -59,7 +65,7 @@ def run_session(
     workers = limits.workers or default_workers()
     progress = Progress(limits.time_limit_s, state.spent_s)
     try:
-        with worker_pool(workers) as executor, progress.alive():
+        with progress.alive():
             if config.search.solver == "fast":
                 _compile_side_by_side(executor, pruner)
             result = search(
@@ -107,7 +113,7 @@ def _report(path: Path, result: SearchResult, mended: int) -> None:
     if counters and (barren := counters[-1].barren_pruner()):
         say(f"no leg survived pruner {barren} at rank {counters[-1].rank}", Level.PROGRESS)
     if mended:
-        say(f"worker processes were lost and replaced {mended} times", Level.PROGRESS)
+        say(f"workers were lost {mended} times; others did their work again", Level.PROGRESS)
     audits = [record.audit for record in counters if record.audit is not None]
     if audits:
         say(AuditEstimate.of(audits).one_line(), Level.PROGRESS)

@@ -103,6 +103,63 @@ class Examples:
         )
 
 
+@final
+@dataclass(frozen=True, eq=False)
+class Parts:
+    """Legs split and made ready for a model; n of them with a label, k features.
+
+    Attributes
+    ----------
+    examples : Examples
+        The n legs.
+    columns : (k,) intp
+        Which features, the most important first.
+    inputs : (n, k) float64
+        Those features, not standardised.
+    learned, validation, calibration : arrays of intp
+        Rows of the three parts.
+    scaler : Standardiser
+        Of the training part.
+    X, y : arrays
+        Standardised inputs (m, k) and labels (m,) of the training part, filled up if asked for.
+    """
+
+    examples: Examples
+    columns: NDArray[np.intp]
+    inputs: NDArray[np.float64]
+    learned: NDArray[np.intp]
+    validation: NDArray[np.intp]
+    calibration: NDArray[np.intp]
+    scaler: Standardiser
+    X: NDArray[np.float64]
+    y: NDArray[np.bool_]
+
+
+def prepare(dataset: Dataset, recipe: Recipe) -> Parts:
+    """Split, rank features, standardise and balance as a recipe says.
+
+    Raises
+    ------
+    InputError
+        Too few legs or pairs, or only one class.
+    """
+    split, ranking, balance = (np.random.default_rng([recipe.seed, stream]) for stream in range(3))
+    examples = Examples.of(dataset)
+    part = split_pairs(examples.pairs, SHARES, split)
+    learned, validation, calibration = (np.flatnonzero(part == k) for k in range(3))
+    _check_classes(examples.y, training=learned, validation=validation, calibration=calibration)
+    columns = np.arange(len(FEATURES))
+    if recipe.n_features < len(FEATURES):
+        order, _ = rank_features(examples.X[learned], examples.y[learned], ranking)
+        columns = order[: recipe.n_features]
+    inputs = examples.X[:, columns]
+    scaler = Standardiser.fit(inputs[learned])
+    X, y = scaler.transform(inputs[learned]), examples.y[learned]
+    if recipe.balance == "adasyn":
+        X, y = adasyn(X, y, balance)
+    return Parts(examples, columns, inputs, learned, validation, calibration, scaler, X, y)
+
+
 def train(
     dataset: Dataset,
     recipe: Recipe,
@@ -135,27 +192,15 @@ def train(
     MissingDependencyError
         The extra ``train`` is not installed.
     """
-    streams = [np.random.default_rng([recipe.seed, stream]) for stream in range(4)]
     model = make_model(recipe.model, **recipe.hyperparameters)
-    examples = Examples.of(dataset)
-    part = split_pairs(examples.pairs, SHARES, streams[0])
-    learned, validation, calibration = (np.flatnonzero(part == k) for k in range(3))
-    _check_classes(examples.y, training=learned, validation=validation, calibration=calibration)
-
-    columns = np.arange(len(FEATURES))
-    if recipe.n_features < len(FEATURES):
-        order, _ = rank_features(examples.X[learned], examples.y[learned], streams[1])
-        columns = order[: recipe.n_features]
-    inputs = examples.X[:, columns]
-    scaler = Standardiser.fit(inputs[learned])
-    X, y = scaler.transform(inputs[learned]), examples.y[learned]
-    if recipe.balance == "adasyn":
-        X, y = adasyn(X, y, streams[2])
+    parts = prepare(dataset, recipe)
+    examples, inputs, scaler, X, y = parts.examples, parts.inputs, parts.scaler, parts.X, parts.y
+    learned, validation, calibration = parts.learned, parts.validation, parts.calibration
     options: dict[str, Any] = {"checkpoint": checkpoint} if isinstance(model, Dnn) else {}
     model.fit(
         X,
         y,
-        rng=streams[3],
+        rng=np.random.default_rng([recipe.seed, 3]),
         X_val=scaler.transform(inputs[validation]),
         y_val=examples.y[validation],
         on_epoch=on_epoch,
@@ -170,8 +215,8 @@ def train(
     return Artefact(
         kind=model.kind,
         feature_set=FEATURE_SET,
-        features=tuple(FEATURES[column].name for column in columns),
-        units=tuple(FEATURES[column].unit for column in columns),
+        features=tuple(FEATURES[column].name for column in parts.columns),
+        units=tuple(FEATURES[column].unit for column in parts.columns),
         arrays={
             **{f"model/{name}": array for name, array in model.to_arrays().items()},
             "scaler/mean": scaler.mean,

@@ -1,6 +1,8 @@
 """Bayesian optimisation of hyperparameters with optuna (Table 3 of the paper)."""
 
+import hashlib
 import multiprocessing
+import uuid
 from collections.abc import Callable, Mapping
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field
@@ -13,6 +15,7 @@ from numpy.typing import NDArray
 from feasibility.errors import InputError
 from feasibility.evaluation.metrics import Confusion
 from feasibility.learning.paper.models import Epoch, make_model
+from feasibility.learning.paper.tune_storage import open_study, without_password
 from feasibility.runtime.extras import load_extra
 
 N_TRIALS: Final = 30
@@ -88,20 +91,32 @@ class Tuning:
         return np.fmax.accumulate([trial.value for trial in self.trials])
 
 
-def tune(task: Task, storage: Path, *, n_trials: int = N_TRIALS, workers: int = 1) -> Tuning:
+def tune(
+    task: Task,
+    storage: Path | str,
+    *,
+    n_trials: int = N_TRIALS,
+    workers: int = 1,
+    on_trial: Callable[[Trial], None] | None = None,
+) -> Tuning:
     """Find hyperparameters by the tree-structured Parzen estimator; poor trials end early.
 
     Parameters
     ----------
     task : Task
         What is optimised.
-    storage : Path
-        Journal file that all workers share. An optimisation goes on from it where it exists:
-        trials that were interrupted are counted as failed and done again.
+    storage : Path or str
+        Path of a journal file that all workers share. An optimisation goes on from it where it
+        exists: trials that were interrupted are counted as failed and done again. Or the URL
+        of a storage that several calls share, on any number of machines: those with the same
+        task work on the same study, and each other task has its own.
     n_trials : int
-        Trials in all, with those already in the file.
+        Trials in all, with those already there. Of several calls each ends the trial that it
+        has begun, so that there may be a few more.
     workers : int
         Processes; trials differ between numbers of workers, as each waits for no other.
+    on_trial : callable, optional
+        Called with each trial that this process ends; with several workers it ends none.
 
     Raises
     ------
@@ -117,71 +132,101 @@ def tune(task: Task, storage: Path, *, n_trials: int = N_TRIALS, workers: int = 
     optuna.logging.set_verbosity(optuna.logging.WARNING)
     study = _open(optuna, task, storage, worker=0, workers=workers)
     states = optuna.trial.TrialState
-    for trial in study.get_trials(states=(states.RUNNING, states.WAITING)):
-        study.tell(trial.number, state=states.FAIL)
+    if isinstance(storage, Path):
+        for trial in study.get_trials(states=(states.RUNNING, states.WAITING)):
+            study.tell(trial.number, state=states.FAIL)
     missing = n_trials - len(study.get_trials(states=(states.COMPLETE, states.PRUNED)))
+    most = n_trials if isinstance(storage, str) else None
     shares = [len(part) for part in np.array_split(np.arange(max(missing, 0)), workers)]
     if workers == 1:
-        _optimise(task, storage, 0, 1, shares[0])
+        _optimise(task, storage, 0, 1, shares[0], most, on_trial)
     else:
         context = multiprocessing.get_context("spawn")
         with ProcessPoolExecutor(workers, mp_context=context) as pool:
             jobs = [
-                pool.submit(_optimise, task, storage, worker, workers, share)
+                pool.submit(_optimise, task, storage, worker, workers, share, most)
                 for worker, share in enumerate(shares)
                 if share
             ]
             for job in jobs:
                 job.result()
-    trials = tuple(
-        Trial(
-            trial.number,
-            trial.state.name.lower(),
-            trial.value if trial.state is states.COMPLETE else float("nan"),
-            trial.duration.total_seconds(),
-            {**trial.params, **task.fixed},
-        )
-        for trial in study.get_trials()
-        if trial.state.is_finished()
-    )
+    ended = (trial for trial in study.get_trials() if trial.state.is_finished())
+    trials = tuple(_plain(task, trial) for trial in ended)
     complete = [trial for trial in trials if trial.state == "complete"]
     if not complete:
-        raise InputError(f"{storage}: no trial was completed; expected at least one")
+        raise InputError(
+            f"{without_password(storage)}: no trial was completed; expected at least one"
+        )
     return Tuning(trials, max(complete, key=lambda trial: trial.value))
 
 
-def _optimise(task: Task, storage: Path, worker: int, workers: int, n_trials: int) -> None:
-    """Do some trials, in this process."""
+def _optimise(
+    task: Task,
+    storage: Path | str,
+    worker: int,
+    workers: int,
+    n_trials: int,
+    most: int | None,
+    on_trial: Callable[[Trial], None] | None = None,
+) -> None:
+    """Do some trials, in this process; no more are begun once the study has `most` of them."""
+    if n_trials == 0:
+        return
     optuna = load_extra("optuna")
     optuna.logging.set_verbosity(optuna.logging.WARNING)
     study = _open(optuna, task, storage, worker, workers)
-    study.optimize(lambda trial: _objective(optuna, task, trial), n_trials=n_trials)
+    states = optuna.trial.TrialState
+    callbacks: list[Any] = []
+    if most is not None:
+        callbacks.append(
+            optuna.study.MaxTrialsCallback(most, states=(states.COMPLETE, states.PRUNED))
+        )
+    if on_trial is not None:
+        callbacks.append(lambda _, trial: on_trial(_plain(task, trial)))
+    study.optimize(
+        lambda trial: _objective(optuna, task, trial), n_trials=n_trials, callbacks=callbacks
+    )
 
 
-def _open(optuna: Any, task: Task, storage: Path, worker: int, workers: int) -> Any:
+def _plain(task: Task, trial: Any) -> Trial:
+    """Return a finished trial of optuna as a record of ours."""
+    state = trial.state.name.lower()
+    return Trial(
+        trial.number,
+        state,
+        trial.value if state == "complete" else float("nan"),
+        trial.duration.total_seconds(),
+        {**trial.params, **task.fixed},
+    )
+
+
+def _open(optuna: Any, task: Task, storage: Path | str, worker: int, workers: int) -> Any:
     objective = "accuracy" if task.f_score is None else f"f{task.f_score:g}"
     name = f"{task.model} {objective}"
-    try:
-        journal = optuna.storages.JournalStorage(
-            optuna.storages.journal.JournalFileBackend(str(storage))
-        )
-        known = [summary.study_name for summary in optuna.get_all_study_summaries(journal)]
-        if not known:
-            optuna.create_study(study_name=name, storage=journal, direction="maximize")
-    except (OSError, ValueError, KeyError) as error:
-        raise InputError(f"{storage}: not a journal of optuna, or damaged ({error})") from None
-    if known and name not in known:
-        raise InputError(f"{storage}: holds the study {known[0]!r}, expected {name!r}")
-    study = optuna.load_study(study_name=name, storage=journal)
-    # Resumed, the sampler must not draw again what it drew at first.
-    seed = np.random.default_rng([task.seed, worker, len(study.trials)]).integers(2**31)
+    others = isinstance(storage, str)
+    study = open_study(optuna, storage, f"{name} {_digest(task)}" if others else name)
+    # Resumed, the sampler must not draw again what it drew at first, nor what others draw.
+    numbers = [task.seed, worker, len(study.trials)] + [uuid.uuid4().int] * others
+    seed = np.random.default_rng(numbers).integers(2**31)
     study.sampler = optuna.samplers.TPESampler(
-        seed=int(seed), n_startup_trials=_RANDOM_TRIALS, constant_liar=workers > 1
+        seed=int(seed), n_startup_trials=_RANDOM_TRIALS, constant_liar=workers > 1 or others
     )
     study.pruner = optuna.pruners.MedianPruner(
         n_startup_trials=_WARM_UP_TRIALS, n_warmup_steps=_WARM_UP_EPOCHS
     )
     return study
+
+
+def _digest(task: Task) -> str:
+    """Return by what calls with the same task know each other, on whatever machine.
+
+    The rows themselves do not count: their last digits may differ between processors.
+    """
+    settings = (task.X.shape, task.X_val.shape, sorted(task.fixed.items()), task.seed)
+    digest = hashlib.sha256(repr(settings).encode())
+    for labels in (task.y, task.y_val):
+        digest.update(np.packbits(labels).tobytes())
+    return digest.hexdigest()[:12]
 
 
 def _objective(optuna: Any, task: Task, trial: Any) -> float:

@@ -2,15 +2,30 @@
 
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, final
 
 from feasibility.constants import AU, MJD2000_MJD
 
-ORBIT: Final = ("a", "e", "i", "node", "argp", "M")
+ORBIT: Final[tuple[str, ...]] = ("a", "e", "i", "node", "argp", "M")
 ANGLES: Final = ("i", "node", "argp", "M")
-NEEDED: Final = ("epoch", *ORBIT)
-FURTHER: Final = ("group", "mass")
+NEEDED: Final[tuple[str, ...]] = ("epoch", *ORBIT)
+INSTEAD: Final = {"a": "q", "M": "tp"}
+"""What comets have in place of a column: perihelion distance and time."""
+STRICT: Final[tuple[str, ...]] = ("group", "mass")
+"""Columns that are not part of the orbit, but are numbers in each row."""
+FURTHER: Final[tuple[str, ...]] = (
+    *STRICT,
+    "H",
+    "G",
+    "diameter",
+    "albedo",
+    "moid",
+    "U",
+    "n_obs",
+    "neo",
+    "pha",
+)
 """Columns that are not part of the orbit: `Catalogue.extra`."""
 
 JD_MJD: Final = 2_400_000.5
@@ -28,8 +43,19 @@ _NAMES: Final = {
     "argp": "w argp peri argperi arg_peri aop omega_lower arg_per arg_periap arg_peric "
     "arg_perihelion argument_of_perihelion argument_of_periapsis argument_of_pericenter",
     "M": "m ma mean_anomaly mean_anom meananomaly",
+    "q": "q qr perihelion_distance",
+    "tp": "tp time_of_perihelion time_of_perihelion_passage",
     "mass": "mass",
     "group": "group",
+    "H": "h absmag abs_mag h_mag absolute_magnitude",
+    "G": "g slope slope_param slope_parameter magnitude_slope",
+    "diameter": "diameter diam",
+    "albedo": "albedo pv geometric_albedo",
+    "moid": "moid",
+    "U": "condition_code",
+    "n_obs": "n_obs n_obs_used",
+    "neo": "neo",
+    "pha": "pha",
 }
 _DATES: Final = {"mjd": "mjd", "jd": "jd", "jdtdb": "jd", "mjd2000": "mjd2000"}
 """Names of columns of epochs that tell the unit too."""
@@ -38,7 +64,7 @@ _MEANING: Final = {name: column for column, names in _NAMES.items() for name in 
 _DEGREES: Final = ("deg", "degree", "degrees", "°")
 _RADIANS: Final = ("rad", "radian", "radians")
 _UNITS: Final[dict[str, dict[str, str]]] = {
-    "a": {"au": "au", "ua": "au", "km": "km", "m": "m"},
+    **{name: {"au": "au", "ua": "au", "km": "km", "m": "m"} for name in ("a", "q")},
     "epoch": {
         **dict.fromkeys(("mjd", "mjd_tdb", "mjd_tt"), "mjd"),
         **dict.fromkeys(("jd", "jd_tdb", "jdtdb", "jd_tt"), "jd"),
@@ -47,6 +73,7 @@ _UNITS: Final[dict[str, dict[str, str]]] = {
         **dict.fromkeys(("tdb", "tt", "utc", "d", "day", "days"), ""),
     },
     "mass": {"kg": "kg"},
+    "diameter": {"km": "km"},
     **{angle: dict.fromkeys(_DEGREES, "deg") | dict.fromkeys(_RADIANS, "rad") for angle in ANGLES},
 }
 _NO_UNIT: Final = ("", "-", "1", "none")
@@ -68,7 +95,8 @@ class Column:
     Attributes
     ----------
     meaning : str, optional
-        "id", "name", "epoch", one of `ORBIT` or of `FURTHER`; None for a column that is skipped.
+        "id", "name", "epoch", "q", "tp", one of `ORBIT` or of `FURTHER`; None for a column that
+        is skipped.
     unit : str
         Such as "rad"; empty where the header does not tell.
     word : str
@@ -108,6 +136,24 @@ def column_of(word: str, unit: str | None) -> Column:
     return Column(meaning, _known_unit(word, meaning, given or suffix), word)
 
 
+def with_unit(column: Column, unit: str) -> Column:
+    """Return a column in a unit that its header does not tell.
+
+    Raises
+    ------
+    UnitError
+        The unit is not known, or the header tells another.
+    """
+    known = _known_unit(column.word, column.meaning, unit)
+    if not known:
+        units = _UNITS.get(column.meaning or "", {})
+        expected = ", ".join(dict.fromkeys(filter(None, units.values()))) or "none"
+        raise UnitError(f"unit {unit!r} of column {column.word} is not known; expected {expected}")
+    if column.unit not in ("", known):
+        raise UnitError(f"column {column.word} is in {column.unit} by the header, not in {unit}")
+    return replace(column, unit=known)
+
+
 def _known_unit(word: str, meaning: str | None, unit: str) -> str:
     plain = unit.lower().rstrip(".")
     known = None if meaning is None else _UNITS.get(meaning)
@@ -125,7 +171,7 @@ def _known_unit(word: str, meaning: str | None, unit: str) -> str:
 
 def in_table_units(meaning: str, unit: str, value: float) -> float:
     """Return a number in AU, degrees or MJD, as its column means it."""
-    if meaning == "a":
+    if meaning in ("a", "q"):
         return value * _PER_UNIT[unit or "au"]
     if meaning == "epoch":
         return value + _DAYS_TO_MJD[unit]

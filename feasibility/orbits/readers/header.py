@@ -8,7 +8,15 @@ from pathlib import Path
 from typing import Final, final
 
 from feasibility.errors import InputError
-from feasibility.orbits.readers.columns import NEEDED, Column, UnitError, column_of
+from feasibility.orbits.readers.columns import (
+    INSTEAD,
+    NEEDED,
+    STRICT,
+    Column,
+    UnitError,
+    column_of,
+    with_unit,
+)
 
 EXAMPLE: Final = "ID epoch(MJD) a(AU) e i(deg) LAN(deg) argperi(deg) M(deg)"
 """A header line that is read: messages show it."""
@@ -65,6 +73,7 @@ def find_header(
     lines: Sequence[str],
     known: Mapping[tuple[str, ...], str],
     quoted: Sequence[str] = (),
+    units: Mapping[str, str] | None = None,
 ) -> Header:
     """Return the header of a table.
 
@@ -78,6 +87,8 @@ def find_header(
         Names of layouts by their columns.
     quoted : sequence of str
         Layouts whose names stand in single quotes.
+    units : mapping of str to str, optional
+        Units of columns, by their words or what they mean, where the header does not tell them.
 
     Raises
     ------
@@ -100,19 +111,27 @@ def find_header(
             faults.append(f"line {index + 1}: {error}")
             continue
         columns = _with_units_first(columns)
+        after = lines[index + 1] if index + 1 < len(lines) else ""
+        columns, widths = _widths(columns, lines[index], after)
         meanings = [column.meaning for column in columns]
         missing = [name for name in NEEDED if name not in meanings]
-        if not missing:
+        # The names of comets have blanks: without a separator their columns are uncertain.
+        instead = INSTEAD if separator or widths else {}
+        if all(instead.get(name, "") in meanings for name in missing):
             _check_twice(file, index, columns)
-            label = known.get(tuple(filter(None, meanings)), "the header")
-            after = lines[index + 1] if index + 1 < len(lines) else ""
-            widths = _widths(lines[index], after, len(columns))
+            columns = _without_spare(_in_units(file, index, columns, units or {}))
+            label = known.get(_layout(columns), "the header")
             return Header(label, columns, separator, index + 1, widths, label in quoted)
         if len(NEEDED) - len(missing) >= _ALMOST:
             comet = {"q", "tp"} & {column.word.lower() for column in columns}
             faults.append(
                 f"line {index + 1}: no column {', '.join(missing)}"
-                + ("; comets, with q and the time of perihelion, are not read" if comet else "")
+                + (
+                    "; comets, with q and the time of perihelion, are read from CSV and from "
+                    "JPL's ELEMENTS.COMET"
+                    if comet
+                    else ""
+                )
             )
     if faults:
         raise InputError(f"{file}, {faults[0]}; {_expected(known)}")
@@ -185,9 +204,61 @@ def _check_twice(file: Path, index: int, columns: Sequence[Column]) -> None:
             )
 
 
-def _widths(header: str, after: str, count: int) -> tuple[tuple[int, int], ...]:
-    """Return where dashes below a header begin and end, if they line up with its words."""
+def _layout(columns: Sequence[Column]) -> tuple[str, ...]:
+    """Return the meanings by which a layout is known."""
+    return tuple(
+        column.meaning for column in columns if column.meaning in ("id", "name", *NEEDED, *STRICT)
+    )
+
+
+def _in_units(
+    file: Path, index: int, columns: tuple[Column, ...], units: Mapping[str, str]
+) -> tuple[Column, ...]:
+    """Return columns with units that the user tells."""
+    changed = list(columns)
+    for name, unit in units.items():
+        places = [
+            place
+            for place, column in enumerate(columns)
+            if column.meaning is not None
+            and name.lower() in (column.word.lower(), column.meaning.lower())
+        ]
+        exact = [
+            place for place in places if name in (columns[place].word, columns[place].meaning)
+        ]
+        places = exact or places
+        if not places:
+            words = ", ".join(column.word for column in columns if column.meaning is not None)
+            raise InputError(
+                f"{file}, line {index + 1}: units of {name!r}, which is no column; columns are "
+                f"{words}"
+            )
+        try:
+            for place in places:
+                changed[place] = with_unit(columns[place], unit)
+        except UnitError as error:
+            raise InputError(f"{file}, line {index + 1}: {error}") from None
+    return tuple(changed)
+
+
+def _without_spare(columns: tuple[Column, ...]) -> tuple[Column, ...]:
+    """Leave out what would stand in place of a column that is there."""
+    meanings = [column.meaning for column in columns]
+    spare = [other for name, other in INSTEAD.items() if name in meanings]
+    return tuple(
+        replace(column, meaning=None) if column.meaning in spare else column for column in columns
+    )
+
+
+def _widths(
+    columns: tuple[Column, ...], header: str, after: str
+) -> tuple[tuple[Column, ...], tuple[tuple[int, int], ...]]:
+    """Return the columns and where dashes below a header begin and end, if they line up."""
     if "\t" in header or "\t" in after or after.strip("- "):
-        return ()
+        return columns, ()
     dashes = [(m.start(), m.end()) for m in re.finditer(r"-+", after)]
-    return tuple(dashes) if len(dashes) == count else ()
+    begin = [column.meaning for column in columns[:2]]
+    if len(dashes) == len(columns) - 1 and begin == ["id", "name"]:
+        # "Num  Name" of JPL's comets is one column, such as "1P/Halley".
+        columns = columns[1:]
+    return columns, tuple(dashes) if len(dashes) == len(columns) else ()

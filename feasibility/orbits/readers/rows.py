@@ -8,14 +8,16 @@ from pathlib import Path
 from typing import Final, final
 
 from feasibility.errors import InputError
-from feasibility.orbits.readers.columns import FURTHER, JD_MJD, in_table_units
+from feasibility.orbits.readers.bodies import A_RANGE_AU, MAX_MJD, TOO_WIDE, UNBOUND, WORDS
+from feasibility.orbits.readers.columns import FURTHER, JD_MJD, STRICT, in_table_units
 from feasibility.orbits.readers.header import COMMENT, SEPARATORS, Header, split_cells
+from feasibility.orbits.readers.json_text import JULIAN
+from feasibility.orbits.readers.perihelion import a_of, mean_anomaly_of, mjd_of_calendar
 
-_MAX_MJD: Final = 200_000.0
-_MIN_A_AU: Final = 1e-3
-_MAX_A_AU: Final = 1e4
-_JULIAN: Final = (2_000_000.0, 3_000_000.0)
-"""Numbers of days that can only be Julian dates."""
+_MIN_A_AU, _MAX_A_AU = A_RANGE_AU
+_CALENDAR: Final = 1e7
+"""Numbers from which times are calendar dates such as 19860205.9."""
+_TRUTH: Final = {"Y": 1.0, "N": 0.0, "true": 1.0, "false": 0.0}
 
 _OTHER_UNITS: Final = ("km", "m", "rad", "jd", "mjd2000")
 
@@ -32,7 +34,12 @@ _RANGES: Final[dict[str, tuple[Callable[[float], bool], str]]] = {
     "node": (lambda x: abs(x) <= 720.0, "an angle in degrees"),
     "argp": (lambda x: abs(x) <= 720.0, "an angle in degrees"),
     "M": (lambda x: abs(x) <= 720.0, "an angle in degrees"),
-    "epoch": (lambda x: 0.0 <= x <= _MAX_MJD, f"an epoch in MJD, 0 to {_MAX_MJD:g}"),
+    "epoch": (lambda x: 0.0 <= x <= MAX_MJD, f"an epoch in MJD, 0 to {MAX_MJD:g}"),
+    "q": (
+        lambda x: 0.0 < x <= _MAX_A_AU,
+        f"a perihelion distance in AU, more than 0, up to {_MAX_A_AU:g}",
+    ),
+    "tp": (lambda x: abs(x) <= 1e8, "a time of perihelion: MJD, Julian date or YYYYMMDD.D"),
     "group": (lambda _: True, "a number"),
     "mass": (lambda _: True, "a number"),
 }
@@ -54,12 +61,15 @@ class Row:
         Its name, where the table has some.
     values : dict of str to float
         Epoch in MJD, a in AU, angles in degrees, and what else the table has.
+    fault : str
+        Why the body is left out, as for `LeftOut`; empty for one that is not.
     """
 
     line: int
     identity: int | None
     name: str | None
     values: dict[str, float]
+    fault: str = ""
 
 
 @final
@@ -67,8 +77,19 @@ class _RowError(Exception):
     """What is wrong with one row; the caller knows the file and the line."""
 
 
-def read_rows(file: Path, lines: Sequence[str], header: Header) -> Iterator[Row | None]:
-    """Yield the rows below a header, None for one that lacks a number.
+def read_rows(file: Path, lines: Sequence[str], header: Header, all_bound: bool) -> Iterator[Row]:
+    """Yield the rows below a header, also of bodies that are no use: those have a fault.
+
+    Parameters
+    ----------
+    file : Path
+        For messages.
+    lines : sequence of str
+        The whole table.
+    header : Header
+        How it is written.
+    all_bound : bool
+        Whether an orbit that is no ellipse is an error; else such a body has a fault.
 
     Raises
     ------
@@ -93,7 +114,7 @@ def read_rows(file: Path, lines: Sequence[str], header: Header) -> Iterator[Row 
             cells = _cells(line, header)
             if julian is None:
                 julian = _is_julian(header, cells)
-            row = _row(index + 1, cells, header, julian)
+            row = _row(index + 1, cells, header, julian, all_bound)
         except _RowError as error:
             cut = "; the last line has no line end: is the file truncated?"
             raise InputError(
@@ -124,7 +145,7 @@ def _is_julian(header: Header, cells: Sequence[str]) -> bool:
     for column, cell in zip(header.columns, cells, strict=True):
         if column.meaning == "epoch" and not column.unit:
             value = _float(cell)
-            return _JULIAN[0] <= value <= _JULIAN[1]
+            return JULIAN[0] <= value <= JULIAN[1]
     return False
 
 
@@ -177,28 +198,68 @@ def _wrong_count(found: int, header: Header, expected: int | None = None) -> str
     return f"{found} columns, expected {count} of {header.label}: {', '.join(names[-count:])}"
 
 
-def _row(number: int, cells: Sequence[str], header: Header, julian: bool) -> Row | None:
-    """Return one row, None if it lacks a number that a table with separators may lack."""
+def _row(number: int, cells: Sequence[str], header: Header, julian: bool, all_bound: bool) -> Row:
+    """Return one row; one that lacks a number may do so in a table with separators."""
     identity: int | None = None
     name: str | None = None
     values: dict[str, float] = {}
+    fault = "" if all_bound else _unbound(header, cells)
+    unbound = bool(fault)
     for column, cell in zip(header.columns, cells, strict=True):
         meaning = column.meaning
         if meaning is None or (meaning in FURTHER and meaning in values):
             continue
-        if not cell and meaning != "name" and (header.separator or header.widths):
-            if meaning in FURTHER:
-                values[meaning] = math.nan
-                continue
-            return None
         if meaning == "name":
             name = name or cell.strip("'\" ") or None
+        elif meaning in FURTHER and meaning not in STRICT:
+            values[meaning] = _further(cell)
+        elif not cell and (header.separator or header.widths):
+            if meaning in STRICT:
+                values[meaning] = math.nan
+            elif not fault:
+                fault = f"without {WORDS.get(meaning, meaning)}"
         elif meaning == "id":
             identity = _identity(cell) if identity is None else identity
-        else:
+        elif not unbound:
             unit = "jd" if julian and meaning == "epoch" and not column.unit else column.unit
             values[meaning] = _number(meaning, unit, cell)
-    return Row(number, identity, name, values)
+    if not fault:
+        _complete(values)
+        low, high = A_RANGE_AU
+        fault = "" if low <= values["a"] <= high else TOO_WIDE
+    return Row(number, identity, name, values, fault)
+
+
+def _unbound(header: Header, cells: Sequence[str]) -> str:
+    """Return the fault of an orbit that is no ellipse, empty for one that is."""
+    for column, cell in zip(header.columns, cells, strict=True):
+        if column.meaning == "e":
+            return UNBOUND if 1.0 <= _float(cell) < math.inf else ""
+    return ""
+
+
+def _complete(values: dict[str, float]) -> None:
+    """Add semi-major axis and mean anomaly where a row has its perihelion in their place."""
+    if "a" not in values:
+        values["a"] = float(a_of(values["q"], values["e"]))
+    if "M" not in values:
+        passage = values["tp"]
+        if passage > _CALENDAR:
+            passage = mjd_of_calendar(passage)
+        elif JULIAN[0] <= passage <= JULIAN[1]:
+            passage -= JD_MJD
+        if not abs(passage) <= MAX_MJD:
+            raise _RowError(
+                f"tp is {values['tp']:.10g}; expected a time of perihelion: MJD, Julian date or "
+                "YYYYMMDD.D"
+            )
+        values["M"] = float(mean_anomaly_of(passage, values["epoch"], values["a"]))
+
+
+def _further(cell: str) -> float:
+    """Return a number beside the orbit, NaN where there is none."""
+    value = _TRUTH.get(cell, _float(cell))
+    return value if math.isfinite(value) else math.nan
 
 
 def _identity(word: str) -> int:
@@ -225,7 +286,7 @@ def _number(meaning: str, unit: str, word: str) -> float:
     if math.isfinite(value) and within(value):
         return value
     hint = ""
-    if meaning == "epoch" and _JULIAN[0] <= value <= _JULIAN[1]:
+    if meaning == "epoch" and JULIAN[0] <= value <= JULIAN[1]:
         hint = f"; is it a Julian date? then it is MJD {value - JD_MJD:.10g}"
     elif re.fullmatch(r"[+-]?\d+,\d+", word):
         hint = ", with a decimal point"

@@ -90,7 +90,9 @@ class ForecastExpander:
         """Return the pairs with their curves, and pairs of which nothing is known."""
         pairs, unknown = [], []
         clock = time.perf_counter()
-        for survey in self._forecast.surveys(nodes, settings):
+        # The audit looks beyond the guide, so that it sees what any pass would have pruned.
+        allows = None if sample.wanted or self._guide.free else self._guide.allows
+        for survey in self._forecast.surveys(nodes, settings, allows):
             counters.questions += survey.questions
             counters.proposed += survey.proposed
             if sample.wanted:

@@ -9,12 +9,13 @@ import functools
 import pickle
 from concurrent.futures import Executor
 from dataclasses import dataclass
-from typing import Final, final
+from typing import Any, Final, final
 
 import numpy as np
 
 from feasibility.classifier.predictor import LegPredictor
 from feasibility.orbits import OrbitalNeighbours
+from feasibility.runtime.cluster import shared
 from seqsearch.beam.counters import RankCounters
 from seqsearch.beam.forecast import Forecast
 from seqsearch.beam.rankings.balanced import BalancedRanking
@@ -89,12 +90,14 @@ class Scouts:
         self._problem = problem
         self._tools = _Tools(problem, predictor, settings.reference_tof_days)
         self._executor = executor
-        self._packed = b""
+        self._packed: Any = None
         if executor is not None:
             try:
-                self._packed = pickle.dumps(self._tools)
+                packed = pickle.dumps(self._tools)
             except (pickle.PicklingError, AttributeError, TypeError):
                 self._executor = None
+            else:
+                self._packed = shared(executor, packed)
 
     def generation(
         self,

@@ -100,6 +100,27 @@ def test_a_baseline_is_trained_under_its_own_name(data, folder, capsys, balance)
     assert f"{synthetic} synthetic" in capsys.readouterr().out
 
 
+@pytest.mark.parametrize("storage", [[], ["--storage", "sqlite:///shared.db"]])
+def test_hyperparameters_are_tuned_first_and_the_same_command_goes_on(
+    data, folder, capsys, storage
+):
+    command = ["train", data, "--model", "tree", "--features", "9", *storage]
+    command += ["--set", "criterion=entropy"]
+    assert main([*command, "--tune", "2"]) == 0
+    assert main([*command, "--tune", "3"]) == 0
+    out = capsys.readouterr().out
+    assert [int(number) for number in re.findall(r"^trial +(\d+): accuracy", out, re.M)] == [
+        0,
+        1,
+        2,
+    ]
+    assert "best: min_samples_leaf" in out
+    recipe = FeasibilityClassifier.load("tree.seqmodel").artefact.config["recipe"]
+    assert recipe["hyperparameters"]["criterion"] == "entropy"
+    assert f"min_samples_leaf {recipe['hyperparameters']['min_samples_leaf']}" in out
+    assert (folder / "tree.seqmodel.trials").exists() == (not storage)
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -109,6 +130,11 @@ def test_a_baseline_is_trained_under_its_own_name(data, folder, capsys, balance)
         (["train", "DATA", "--model", "tree", "--set", "depth=3"], "depth"),
         (["train", "DATA", "--model", "tree", "--set", "depth"], "NAME=VALUE"),
         (["train", "DATA", "--features", "200"], "200"),
+        (["train", "DATA", "--storage", "sqlite:///x.db"], "--storage: goes with --tune"),
+        (["train", "DATA", "--model", "margin", "--tune", "3"], "not for margin"),
+        (["train", "DATA", "--preset", "dnn1", "--tune", "3"], "not for dnn1"),
+        (["train", "DATA", "--tune", "0"], "--tune 0: expected one or more"),
+        (["train", "DATA", "--tune", "1", "--storage", "x.db"], "expected the URL of a storage"),
         (["train", "DATA", "--seed", "-1"], "--seed"),
         (["train", "DATA", "--out", "no/such/folder/m.seqmodel"], "no folder"),
         (["evaluate", "none.seqmodel", "DATA"], "none.seqmodel"),

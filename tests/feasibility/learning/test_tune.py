@@ -1,17 +1,21 @@
-"""Bayesian optimisation: counted, resumable, shared by workers."""
+"""Bayesian optimisation: counted, resumable, shared by workers and by processes."""
 
+import subprocess
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from feasibility import InputError
+from feasibility import InputError, MissingDependencyError
 from feasibility.learning.paper import tune as module
 from feasibility.learning.paper.tune import SPACES, Task, tune
 
 pytest.importorskip("optuna")
 pytest.importorskip("sklearn")
 
+ROOT = Path(__file__).resolve().parents[3]
 RNG = np.random.default_rng(0)
 X = RNG.normal(size=(500, 4))
 Y = X[:, 0] * X[:, 1] > 0
@@ -122,6 +126,78 @@ def test_a_journal_of_another_study_or_damaged_is_refused(journal):
     journal.write_text("not a journal\n")
     with pytest.raises(InputError, match="not a journal"):
         tune(TASK, journal, n_trials=2)
+
+
+SHARING = """
+import sys
+from tests.feasibility.learning.test_tune import TASK, tune
+
+tuning = tune(TASK, sys.argv[1], n_trials=int(sys.argv[2]))
+print(len(tuning.trials))
+"""
+
+
+@pytest.mark.parametrize("scheme", ["sqlite", "journal"])
+def test_processes_share_a_study_by_its_url(tmp_path, scheme):
+    url = f"{scheme}:///{tmp_path / 'study'}"
+    processes = [
+        subprocess.Popen(
+            [sys.executable, "-c", SHARING, url, "12"],
+            cwd=ROOT,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        for _ in range(2)
+    ]
+    for process in processes:
+        _, errors = process.communicate(timeout=120)
+        assert process.returncode == 0, errors
+    tuning = tune(TASK, url, n_trials=12)
+    assert 12 <= len(tuning.trials) <= 13
+    assert [trial.number for trial in tuning.trials] == list(range(len(tuning.trials)))
+    # No process draws what another one drew.
+    assert len({str(trial.hyperparameters) for trial in tuning.trials}) == len(tuning.trials)
+
+
+def test_each_task_has_its_own_study_in_a_shared_storage(tmp_path):
+    url = f"sqlite:///{tmp_path / 'study.db'}"
+    tune(TASK, url, n_trials=2)
+    assert len(tune(replace(TASK, seed=1), url, n_trials=1).trials) == 1
+    assert len(tune(TASK, url, n_trials=2).trials) == 2
+
+
+def test_another_process_s_running_trial_is_left_alone(tmp_path):
+    url = f"sqlite:///{tmp_path / 'study.db'}"
+    tune(TASK, url, n_trials=1)
+    study = module._open(pytest.importorskip("optuna"), TASK, url, 0, 1)
+    study.ask()
+    assert len(tune(TASK, url, n_trials=3).trials) == 3
+    assert [trial.state.name for trial in study.get_trials()].count("RUNNING") == 1
+
+
+@pytest.mark.parametrize(
+    ("url", "error", "message"),
+    [
+        ("study.db", InputError, "expected the URL of a storage, sqlite:///FILE"),
+        ("oracle-of-delphi://x", InputError, "cannot be used"),
+        ("sqlite:////no/such/folder/study.db", InputError, "unable to open database file"),
+        ("postgresql+nodriver://me:secret@x/y", InputError, "cannot be used"),
+    ],
+)
+def test_a_storage_of_no_use_is_one_line_without_its_password(url, error, message):
+    with pytest.raises(error, match=message) as caught:
+        tune(TASK, url, n_trials=1)
+    assert "\n" not in str(caught.value)
+    assert "secret" not in str(caught.value)
+
+
+def test_a_driver_that_is_not_installed_is_named(monkeypatch):
+    monkeypatch.setitem(sys.modules, "psycopg2", None)
+    with pytest.raises(MissingDependencyError, match="psycopg2") as caught:
+        tune(TASK, "postgresql+psycopg2://me:secret@localhost/x", n_trials=1)
+    assert "\n" not in str(caught.value)
+    assert "secret" not in str(caught.value)
 
 
 def test_an_unknown_model_is_refused(journal):

@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from feasibility import AllOf, KeepAll
+from feasibility.pruners import PrunerContractError
 from seqsearch import TimePropellantRanking, search
 from seqsearch.beam.expanders.forecast import ForecastExpander
 from seqsearch.beam.expanders.grid import GridExpander
@@ -132,3 +134,21 @@ def test_another_order_of_search_is_a_frontier_of_a_few_lines(problem):
     kept = [record.kept for record in result.counters]
     assert set(kept) <= {0, 1}
     assert result.tour.n_asteroids >= 2
+
+
+def test_a_pruner_that_breaks_the_contract_is_refused_before_the_search():
+    class Fickle:
+        name = "fickle"
+
+        def keep(self, legs, /):
+            return np.arange(len(legs)) % 2 == 0
+
+    ranks = []
+    with pytest.raises(PrunerContractError, match=r"Fickle\.keep: not row-wise"):
+        search(
+            small_problem(),
+            pruner=AllOf(KeepAll(), Fickle()),
+            settings=small_settings(),
+            on_rank=ranks.append,
+        )
+    assert ranks == []

@@ -7,8 +7,10 @@ import pytest
 
 from seqsearch import search
 from seqsearch.beam.counters import RankCounters
-from seqsearch.beam.pacing import ClockPacing
+from seqsearch.beam.pacing import ClockPacing, FixedPacing
 from seqsearch.beam.rankings.rebalance import rebalanced
+from seqsearch.beam.scouting.guide import ItineraryGuide
+from seqsearch.core.nodes import Nodes, no_nodes
 from seqsearch.deadline import Deadline
 from tests.helpers.problems import small_problem, small_settings
 
@@ -30,6 +32,15 @@ def _nodes(problem, depth, elapsed_days, mass):
         t_arr_mjd2000=np.full(2, start + elapsed_days),
         mass=np.full(2, mass),
     )
+
+
+def _ends(paths):
+    """Return nodes that visited the given catalogue rows in turn."""
+    depth = np.array([len(path) - 1 for path in paths])
+    rows = np.array([path[0] for path in paths])
+    nodes = Nodes.at_start(rows, np.zeros(len(paths)), np.ones(len(paths)))
+    visited = np.array([path + [-1] * (4 - len(path)) for path in paths])
+    return replace(nodes, depth=depth, visited=visited)
 
 
 def _counters(n, seconds_per_node):
@@ -98,3 +109,48 @@ def test_a_time_limit_is_used_up_and_not_exceeded_by_much():
     result = search(small_problem(), settings=small_settings(), time_limit_s=4.0)
     assert result.stopped == "time limit"
     assert 4.0 <= time.monotonic() - began < 12.0
+
+
+def test_a_guided_pass_keeps_to_the_itineraries_that_there_is_time_for(clock):
+    problem = small_problem()
+    pacer = ClockPacing(problem, Deadline(100.0), small_settings())
+    pacer.begin_pass(1, small_settings(), [], scouted=True)
+    ends = _ends([[5, 1, 2, 3], [5, 1, 4, 6], [7, 8, 9, 10]])
+    waiting = _ends([[5], [7], [11]])
+    guide = ItineraryGuide(ends)
+    assert guide.legs_left(waiting) == 3
+    # What leads nowhere is dropped, however much time there is.
+    assert pacer.narrowed(guide, waiting, _counters(100, 0.001)).row.tolist() == [5, 7]
+    # 80 s for 3 legs at 4 nodes an itinerary and 4 s a node: one itinerary.
+    assert pacer.narrowed(guide, waiting, _counters(100, 4.0)).row.tolist() == [5]
+    onward = guide.allows(waiting, np.array([0, 0, 1]), np.array([1, 8, 8]))
+    assert onward.tolist() == [True, False, False]
+    # Itineraries on which nothing was flown do not take the place of others.
+    guide = ItineraryGuide(ends)
+    assert pacer.narrowed(guide, waiting.take([1]), _counters(100, 4.0)).row.tolist() == [7]
+    assert guide.legs_left(_ends([[11]])) == 0
+    assert len(FixedPacing().narrowed(guide, waiting, [])) == 3
+
+
+def test_in_little_time_a_narrow_beam_comes_first_and_later_one_is_among_the_scouted(clock):
+    problem, settings = small_problem(), small_settings()
+    pacer = ClockPacing(problem, Deadline(10.0), settings)
+    assert pacer.begin_narrow_pass(1) is not None
+    assert pacer.begin_narrow_pass(2) is None
+    pacer = ClockPacing(problem, Deadline(600.0), settings)
+    assert pacer.begin_narrow_pass(1) is None
+    narrow = pacer.begin_narrow_pass(2)
+    assert narrow is not None
+    assert pacer.width(no_nodes(), narrow, _counters(100, 1e-5)) == narrow.beam_width == 60
+    assert pacer.begin_narrow_pass(3) is None
+    pacer.begin_pass(3, settings, [], scouted=True)
+    clock[0] += 599.0
+    assert pacer.begin_narrow_pass(2) is None
+    assert FixedPacing().begin_narrow_pass(2) is None
+
+
+def test_scouts_are_narrower_where_they_would_take_all_the_time(clock):
+    settings = small_settings(scouts={"width": 200})
+    for limit, width in ((600.0, 200), (30.0, 100), (1.0, 30)):
+        pacer = ClockPacing(small_problem(), Deadline(limit), settings)
+        assert pacer.begin_pass(1, settings, [], scouted=True).scouts.width == width

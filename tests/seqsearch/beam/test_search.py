@@ -8,7 +8,7 @@ import networkx as nx
 import numpy as np
 import pytest
 
-from feasibility import AllOf, KeepAll, Mima2Pruner
+from feasibility import AllOf, InputError, KeepAll, Mima2Pruner
 from feasibility.runtime.workers import worker_pool
 from seqsearch import search, verify_tour
 from tests.helpers.problems import small_problem, small_settings
@@ -58,6 +58,18 @@ def test_the_same_seed_gives_the_same_tour_in_parallel(result, problem):
         )
     assert parallel.tour == result.tour
     assert len(parallel.tree) == len(result.tree)
+
+
+def test_a_search_can_have_workers_of_its_own(result, problem):
+    own = search(problem, settings=small_settings(), rng=np.random.default_rng(4), workers=2)
+    assert own.tour == result.tour
+
+
+def test_workers_and_an_executor_are_one_too_many(problem):
+    with ThreadPoolExecutor(1) as pool, pytest.raises(InputError, match="one of them"):
+        search(problem, workers=1, executor=pool)
+    with pytest.raises(InputError, match="workers = 0, expected one or more"):
+        search(problem, workers=0)
 
 
 def test_the_order_in_which_workers_finish_does_not_matter(result, problem):

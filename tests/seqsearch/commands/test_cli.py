@@ -44,7 +44,7 @@ def test_a_run_writes_its_folder_and_verifies(run_folder, capsys):
     names = {path.name for path in run_folder.iterdir()}
     assert names == {
         "config.toml", "provenance.json", "counters.csv", "sequence.json", "sequence.csv",
-        "tour.png", "audit.json", "checkpoints", "sequence.search.json", ".lock",
+        "tour.png", "audit.json", "candidates.csv", "checkpoints", "sequence.search.json", ".lock",
     }  # fmt: skip
     assert tomllib.loads((run_folder / "config.toml").read_text())["search"]["beam_width"] == 3
     provenance = json.loads((run_folder / "provenance.json").read_text())

@@ -11,12 +11,15 @@ from hypothesis import strategies as st
 from scipy.stats import binomtest
 
 from feasibility import Legs
+from seqsearch import search
 from seqsearch.core.candidates import Candidates
 from seqsearch.core.hops import Hops
 from seqsearch.core.nodes import Nodes
 from seqsearch.deadline import Deadline
 from seqsearch.pruning.audit import RankSample
 from seqsearch.pruning.audit_estimate import AuditEstimate, RankAudit, Stratum, share_interval
+from seqsearch.runs.run_folder import candidates_csv
+from tests.helpers.problems import small_problem, small_settings
 
 PROBLEM = SimpleNamespace(min_stay_days=30.0)
 START = Nodes.at_start(np.zeros(1, dtype=np.intp), np.zeros(1), np.full(1, 2000.0))
@@ -232,3 +235,22 @@ def test_the_stream_of_the_search_is_not_advanced():
     before = copy.deepcopy(rng.bit_generator.state)
     RankSample(rng, 0, 10, None).offer(_candidates(_tofs(50)), np.zeros(50, dtype=bool))
     assert rng.bit_generator.state == before
+
+
+def test_what_was_tried_is_listed_one_by_one():
+    settings = small_settings(pruner="default:0.99", audit={"per_rank": 20})
+    counters = search(small_problem(), settings=settings, max_solves=300).counters
+    audits = [record.audit for record in counters if record.audit is not None]
+    assert audits
+    for audit in audits:
+        for side, kept in ((audit.pruned, False), (audit.kept, True)):
+            hops = [hop for hop in audit.hops if hop.kept == kept]
+            assert len(hops) == sum(stratum.solved for stratum in side)
+            assert sum(hop.flyable for hop in hops) == sum(stratum.flyable for stratum in side)
+            assert all(hop.tof_days > 0 for hop in hops)
+        known = [hop for hop in audit.hops if hop.margin is not None]
+        near = [hop for hop in known if not hop.kept and 0.9 <= hop.margin < 0.97]
+        assert len(near) == sum(s.solved for s in audit.pruned if s.label == "0.9 to 0.97")
+    table = candidates_csv(counters).splitlines()
+    assert len(table) == 1 + sum(len(audit.hops) for audit in audits)
+    assert table[0] == "pass,rank,kept,tof_days,predicted_margin,flyable"

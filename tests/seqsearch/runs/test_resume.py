@@ -224,14 +224,14 @@ class DropsAll:
 
 
 class TurnsBad:
-    """Good for the first rank."""
+    """Good for the check before the search and for the first rank."""
 
     def __init__(self):
         self.calls = 0
 
     def keep(self, legs, /):
         self.calls += 1
-        return Mima2Pruner().keep(legs) if self.calls < 3 else np.ones(1, dtype=np.float64)
+        return Mima2Pruner().keep(legs) if self.calls < 8 else np.ones(1, dtype=np.float64)
 
 
 BAD = [
