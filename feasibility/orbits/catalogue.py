@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from types import MappingProxyType
-from typing import Any, final
+from typing import Any, Final, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,7 +13,10 @@ from feasibility.constants import DAY_S, MU_SUN
 from feasibility.errors import InputError
 from feasibility.orbits.classical import perifocal_axes
 from feasibility.orbits.spk.kernel_table import KernelTable
+from feasibility.quantities import plain_numbers
 from feasibility.runtime.text_column import TextColumn, taken_texts
+
+_ELEMENT_UNITS: Final = ("m", "", "rad", "rad", "rad", "rad")
 
 
 @final
@@ -24,7 +27,8 @@ class Catalogue:
     An `feasibility.orbits.spk.Ephemeris` of two-body motion, unless another one is given.
 
     With n the number of bodies. Arrays are copied once, validated once and
-    made read-only.
+    made read-only. Quantities with units (astropy, pint) are converted; elements, which have
+    several units, as rows of single quantities.
 
     Parameters
     ----------
@@ -49,9 +53,9 @@ class Catalogue:
     Raises
     ------
     InputError
-        A shape does not fit, an epoch or element is not finite, an orbit is not an
-        ellipse (a <= 0 or e outside [0, 1)), or an id occurs twice. The message names
-        the first bad row.
+        A shape does not fit, a unit cannot be converted, an epoch or element is not finite,
+        an orbit is not an ellipse (a <= 0 or e outside [0, 1)), or an id occurs twice. The
+        message names the first bad row.
 
     Examples
     --------
@@ -80,7 +84,7 @@ class Catalogue:
         ephemeris: KernelTable | None = None,
     ) -> None:
         id_column = _integers("Catalogue ids", ids)
-        element_rows = np.array(elements, dtype=np.float64)
+        element_rows = _numbers("Catalogue elements", elements, _ELEMENT_UNITS)
         n = len(id_column)
         if n == 0:
             element_rows = element_rows.reshape(0, 6)
@@ -91,7 +95,7 @@ class Catalogue:
             )
         if len(names) != n:
             raise InputError(f"Catalogue names: {len(names)} names, expected {n}, one an id")
-        epochs = np.array(epoch_mjd2000, dtype=np.float64)
+        epochs = _numbers("Catalogue epoch_mjd2000", epoch_mjd2000, ("day",))
         if epochs.shape not in ((), (1,), (n,)):
             raise InputError(
                 f"Catalogue epoch_mjd2000: expected shape ({n},) or one value, got {epochs.shape}"
@@ -308,6 +312,16 @@ class Catalogue:
         return packed
 
 
+def _numbers(label: str, values: ArrayLike, units: tuple[str, ...]) -> NDArray[np.float64]:
+    """Return a copy as float64, of quantities with units in the given ones."""
+    try:
+        return np.array(plain_numbers(label, values, units), dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(f"{label}: expected numbers ({error})") from None
+
+
 def _integers(what: str, values: ArrayLike) -> NDArray[np.int64]:
     array = np.atleast_1d(np.asarray(values))
     if array.size == 0:
@@ -321,8 +335,11 @@ def _integers(what: str, values: ArrayLike) -> NDArray[np.int64]:
 
 def _extra_column(name: str, values: ArrayLike, n: int) -> NDArray[np.float64]:
     try:
-        column = np.array(values, dtype=np.float64)
-    except (TypeError, ValueError):
+        plain = plain_numbers(f"Catalogue extra {name!r}", values, ())
+        column = np.array(plain, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        if isinstance(error, InputError):
+            raise
         raise InputError(f"Catalogue extra {name!r}: expected numbers") from None
     if column.shape != (n,):
         raise InputError(

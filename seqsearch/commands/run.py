@@ -51,7 +51,7 @@ def add_parser(commands: "Commands") -> None:
         help="such as lambert:1.3,mima2:0.97; default:RECALL or FILE.seqmodel:RECALL for a "
         "trained model; none keeps all",
     )
-    run.add_argument("--solver", choices=("fast", "reference"), help="leg solver")
+    run.add_argument("--solver", choices=("fast", "reference", "best", "auto"), help="leg solver")
     run.add_argument(
         "--polish",
         metavar="T",
