@@ -25,6 +25,10 @@ the asteroid table at hand (--catalogue, or where config.toml says) bodies are c
 it. Where bodies move as SPK kernels say, arrivals are checked against SPICE itself, with the
 very files of the run (--catalogue, or where config.toml says). Exit code 0 if everything holds,
 else 1.
+
+With --continuous the rows of a refined tour are checked instead, as they are handed in: the
+motion from each row to the next and through all rows of a phase, thrust, mass flow, and the
+bodies met, by the rules of the problem and the elements of the asteroid table.
 """
 
 
@@ -46,6 +50,25 @@ def add_parser(commands: "Commands") -> None:
     verify.add_argument(
         "--catalogue", metavar="FILE", help="compare the bodies with this asteroid table"
     )
+    verify.add_argument(
+        "--continuous",
+        action="store_true",
+        help="check trajectory.rows of the run, or a file of rows instead of RUN",
+    )
+    verify.add_argument(
+        "--position-tolerance",
+        type=float,
+        default=1000.0,
+        metavar="KM",
+        help="with --continuous: how near to come to bodies (default: 1000)",
+    )
+    verify.add_argument(
+        "--velocity-tolerance",
+        type=float,
+        default=1.0,
+        metavar="M_S",
+        help="with --continuous: largest velocity error at bodies (default: 1)",
+    )
     add_output(verify)
     verify.set_defaults(run=_verify)
 
@@ -56,6 +79,8 @@ def _verify(options: argparse.Namespace) -> int:
     from seqsearch.tours.tour_files import read_tour
 
     path = Path(options.path)
+    if options.continuous:
+        return _verify_continuous(options)
     fleet = is_fleet(path)
     paths = probe_paths(path) if fleet else [sequence_path(options.path)]
     tours = [read_tour(file) for file in paths]
@@ -68,9 +93,25 @@ def _verify(options: argparse.Namespace) -> int:
         outcomes.append(together)
         say(f"{sum(tour.n_asteroids for tour in tours)} asteroids on {len(tours)} probes")
         say(together.table())
+    return _concluded(outcomes, options.json)
+
+
+def _verify_continuous(options: argparse.Namespace) -> int:
+    from seqsearch.commands.verify_continuous import verify_continuous
+    from seqsearch.tours.verify_rows import Tolerances
+
+    tolerances = Tolerances(options.position_tolerance, options.velocity_tolerance)
+    outcomes = verify_continuous(
+        Path(options.path), options.problem, options.catalogue, tolerances
+    )
+    return _concluded(outcomes, options.json)
+
+
+def _concluded(outcomes: "list[Verification]", as_json: bool) -> int:
+    """Say whether all checks passed, and return the exit code."""
     passed = all(outcome.passed for outcome in outcomes)
     say("verified" if passed else "NOT verified")
-    if options.json:
+    if as_json:
         checks = [asdict(check) for outcome in outcomes for check in outcome.checks]
         say_json({"verified": passed, "checks": checks})
     return 0 if passed else 1

@@ -84,7 +84,7 @@ def refine_tour(
         raise InputError("the tour has no leg, so there is nothing to refine")
     if time_price is not None and not 0.0 < time_price < np.inf:
         raise InputError(f"time price {time_price:g}, expected more than 0")
-    attempts = _ATTEMPTS
+    attempts: tuple[_Attempt, ...] = _ATTEMPTS
     if time_price is not None:
         attempts = (_Attempt(time_price, catch_up=False), _Attempt(time_price, catch_up=True))
     failures = []
