@@ -22,7 +22,7 @@ from seqsearch.runs.polishing import polish_run
 from seqsearch.runs.run_folder import SEQUENCE, RunFolder
 from seqsearch.settings import SearchSettings
 from seqsearch.tours.dates import date_of
-from seqsearch.tours.plots import plot_tour
+from seqsearch.tours.pictures.plots import plot_tour
 from seqsearch.tours.tour import Tour
 from seqsearch.tours.tour_files import read_tour
 
