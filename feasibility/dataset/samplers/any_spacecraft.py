@@ -9,13 +9,7 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from feasibility.constants import AU, DAY_S, MU_SUN, mjd_to_mjd2000
-from feasibility.dataset.samplers.draws import (
-    Columns,
-    Draw,
-    check_ranges,
-    collect,
-    log_uniform,
-)
+from feasibility.dataset.samplers.draws import Columns, Draw, check_ranges, collect, log_uniform
 from feasibility.dataset.samplers.free_ends import FreeEnds
 from feasibility.dataset.samplers.impulsive import ImpulsiveGrid
 from feasibility.legs import Legs, Spacecraft

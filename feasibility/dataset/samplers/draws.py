@@ -79,7 +79,7 @@ def collect(n: int, batch: Callable[[int], Columns]) -> Columns:
 
 
 def log_uniform(rng: Generator, bounds: tuple[float, float], n: int) -> NDArray[np.float64]:
-    """Return n numbers whose logarithms are uniform between those of the bounds."""
+    """Draw (n,) numbers, as many in each octave between two bounds."""
     low, high = np.log(bounds)
     return np.exp(rng.uniform(low, high, n))
 

@@ -241,7 +241,7 @@ def test_collect_keeps_the_order_of_what_is_accepted():
 def test_every_built_in_protocol_reads():
     names = builtin_protocols()
     ends = {"launch", "launch-flyby", "arrival", "flyby"}
-    assert set(names) == {"table1", "limited", "search", "general", "paper"} | ends
+    assert set(names) == {"table1", "limited", "search", "general", "paper", "transfers"} | ends
     for name in names:
         assert read_protocol(name).name == name
     assert read_protocol("paper").label == "convergence"
