@@ -141,10 +141,23 @@ def _margin_labels(
 ) -> dict[str, Any]:
     heaviest = solve_max_initial_mass(draw.legs, method=protocol.solver)
     m_star = np.where(heaviest.converged, heaviest.m0, np.nan)
+    legs, redrawn = _at_boundary(draw, m_star, chosen, log_ratio)
+    return _flown_labels(legs, protocol, heaviest, redrawn)
+
+
+def _at_boundary(
+    draw: Draw,
+    m_star: NDArray[np.float64],
+    chosen: NDArray[np.bool_],
+    log_ratio: NDArray[np.float64],
+) -> tuple[Legs, NDArray[np.bool_]]:
+    """Return the legs with the chosen masses drawn again near m*, and which these are.
+
+    A mass that would leave the protocol's range keeps its first draw.
+    """
     near = m_star * np.exp(log_ratio)
     redrawn = chosen & (near >= draw.m0_min) & (near <= draw.m0_max)
-    legs = _with_masses(draw.legs, np.where(redrawn, near, draw.legs.m0))
-    return _flown_labels(legs, protocol, heaviest, redrawn)
+    return _with_masses(draw.legs, np.where(redrawn, near, draw.legs.m0)), redrawn
 
 
 def _margin_range_labels(
