@@ -97,10 +97,9 @@ def main() -> None:
         path = options.keep or Path(folder) / "MPCORB.DAT"
         start = time.perf_counter()
         write_mpcorb(path, options.bodies, np.random.default_rng(options.seed))
+        seconds = time.perf_counter() - start
         size = path.stat().st_size / 1e6
-        print(
-            f"{options.bodies} bodies, {size:.0f} MB, written in {time.perf_counter() - start:.0f} s"
-        )
+        print(f"{options.bodies} bodies, {size:.0f} MB, written in {seconds:.0f} s")
         cache = Path(folder) / "cache"
         print(f"select: {SELECT}")
         print(f"{'':<34}{'s':>8}{'MiB':>8}{'bodies':>10}")
@@ -109,8 +108,8 @@ def main() -> None:
             ("from the cache", ""),
             ("from the cache, those selected", SELECT),
         ):
-            seconds, peak, bodies = timed(path, cache, select)
-            print(f"{what:<34}{seconds:>8}{peak:>8}{bodies:>10}")
+            took, peak, bodies = timed(path, cache, select)
+            print(f"{what:<34}{took:>8}{peak:>8}{bodies:>10}")
 
 
 if __name__ == "__main__":

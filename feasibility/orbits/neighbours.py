@@ -42,6 +42,14 @@ def orbital_metric(states: ArrayLike, reference_tof_days: float) -> NDArray[np.f
     return np.concatenate([drift + rv[:, 3:], drift], axis=1)
 
 
+_MANY_QUERIES: Final = 5000
+"""From so many on, queries go from leaf to leaf of a tree: memory is read in order, 4 times as
+fast for 200 000 bodies."""
+
+_SAMPLED: Final = 50
+"""One body in so many tells how dense neighbourhoods are."""
+
+
 @final
 class OrbitalNeighbours:
     """Nearest neighbours over a whole catalogue at any epoch.
@@ -126,6 +134,54 @@ class OrbitalNeighbours:
             result[members] = _others(tree, index[members], n_neighbours)
         return result
 
+    def densest(
+        self, rows: ArrayLike, t_mjd2000: float, n_neighbours: int, count: int
+    ) -> NDArray[np.int64]:
+        """Return those of many bodies that are in the densest neighbourhoods.
+
+        A search within a distance is several times as fast as one for the nearest. The distance
+        is that within which some of the bodies have enough neighbours.
+
+        Parameters
+        ----------
+        rows : array_like
+            (k,) rows of the catalogue.
+        t_mjd2000 : float
+            Epoch, rounded to its bucket.
+        n_neighbours : int
+            How many neighbours make a neighbourhood, 1 to n - 1.
+        count : int
+            How many bodies are wanted.
+
+        Returns
+        -------
+        NDArray
+            Positions in `rows`, ascending, of at least `count` bodies (all, if there are no
+            more): those whose n-th neighbour is nearest, at the epoch of the bucket.
+
+        Raises
+        ------
+        InputError
+            As `query`.
+        """
+        index, epochs = self._catalogue.checked_queries(rows, t_mjd2000)
+        if count >= len(index):
+            return np.arange(len(index))
+        tree = self._tree(int(np.rint(epochs[0] / self._bucket_days)))
+        order = np.argsort(_places(tree)[index], kind="stable")
+        points = tree.data[index[order]]
+        sample = np.sort(tree.query(points[::_SAMPLED], k=[n_neighbours + 1])[0][:, 0])
+        place = count // _SAMPLED + 3
+        while place < len(sample):
+            within = tree.query(
+                points, k=[n_neighbours + 1], distance_upper_bound=float(sample[place])
+            )[0][:, 0]
+            found = np.flatnonzero(np.isfinite(within))
+            if len(found) >= count:
+                return np.sort(order[found])
+            place *= 2
+        return np.arange(len(index))
+
     def _tree(self, bucket: int) -> Any:
         tree = self._trees.get(bucket)
         if tree is None:
@@ -139,8 +195,22 @@ class OrbitalNeighbours:
         return tree
 
 
+def _places(tree: Any) -> NDArray[np.int64]:
+    """Return (n,) where each body lies in the order of the leaves."""
+    places = np.empty(tree.n, np.int64)
+    places[tree.indices] = np.arange(tree.n)
+    return places
+
+
 def _others(tree: Any, rows: NDArray[np.int64], n_neighbours: int) -> NDArray[np.int64]:
-    distance, found = tree.query(tree.data[rows], k=n_neighbours + 1)
+    if len(rows) < _MANY_QUERIES:
+        distance, found = tree.query(tree.data[rows], k=n_neighbours + 1)
+    else:
+        order = np.argsort(_places(tree)[rows], kind="stable")
+        back = np.empty_like(order)
+        back[order] = np.arange(len(order))
+        distance, found = tree.query(tree.data[rows[order]], k=n_neighbours + 1)
+        distance, found = distance[back], found[back]
     found = found.astype(np.int64)
     # A body among many coincident ones may be missing from its own answer: then the
     # farthest found is the one too many.

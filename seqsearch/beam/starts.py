@@ -30,6 +30,15 @@ _SOFT: Final = 0.3
 
 _PAIRS_AT_ONCE: Final = 300
 
+_MANY_BODIES: Final = 100_000
+"""From so many on, crowds are measured only where neighbourhoods are dense, and each epoch looks
+at bodies of its own; no published competition has as many."""
+_BODIES_AN_EPOCH: Final = 25_000
+"""How many bodies an epoch looks at then, among them every k-th: epochs take turns."""
+_SPARE: Final = 4
+"""How many times as many bodies are measured as are wanted: between the epoch in question and that
+of the neighbours' bucket, distances change by some per cent."""
+
 Starts = Callable[[SearchSettings, np.random.Generator], Nodes]
 """Chooses the start nodes of a pass."""
 
@@ -65,7 +74,8 @@ def dense_starts(
     the departure window (stratified, so that passes with other seeds see other
     epochs). At each, every allowed body's distance to its eighth nearest
     neighbour in the orbital metric is found; the pairs with the smallest win,
-    each body at most once. `window` replaces the problem's earliest and latest start epoch.
+    each body at most once, or where it is alone as often as there are epochs. `window` replaces
+    the problem's earliest and latest start epoch.
 
     Returns
     -------
@@ -166,20 +176,30 @@ def _crowded(
     allowed = problem.start_rows()
     crowd = min(_CROWD, len(problem.catalogue) - 1)
     rows, times, distances = [], [], []
-    for epoch in earliest + slices * (latest - earliest):
-        near = neighbours.query(allowed, np.full(len(allowed), epoch), crowd)
+    for turn, epoch in enumerate(earliest + slices * (latest - earliest)):
+        here = allowed
+        if len(allowed) >= _MANY_BODIES:
+            step = len(allowed) // _BODIES_AN_EPOCH
+            here = allowed[turn % step :: step]
+            here = here[neighbours.densest(here, epoch, crowd, _SPARE * per_epoch)]
+        near = neighbours.query(here, np.full(len(here), epoch), crowd)
         points = orbital_metric(problem.catalogue.states(epoch), settings.reference_tof_days)
-        distance = np.linalg.norm(points[near[:, -1]] - points[allowed], axis=1)
+        distance = np.linalg.norm(points[near[:, -1]] - points[here], axis=1)
         best = np.argsort(distance, kind="stable")[:per_epoch]
-        rows.append(allowed[best])
+        rows.append(here[best])
         times.append(np.full(len(best), epoch))
         distances.append(distance[best])
     return np.concatenate(rows), np.concatenate(times), np.concatenate(distances)
 
 
 def _best_of_each_body(rows: _Rows, cost: _Array, count: int) -> _Rows:
-    """Return the positions of the pairs with the least cost, one of each body, best first."""
+    """Return the positions of the pairs with the least cost, one of each body, best first.
+
+    A body that is alone may be there as often as it is among the pairs.
+    """
     order = np.argsort(cost, kind="stable")
+    if len(rows) and (rows == rows[0]).all():
+        return order[:count]
     _, first = np.unique(rows[order], return_index=True)
     chosen: _Rows = order[np.sort(first)[:count]]
     return chosen

@@ -9,8 +9,6 @@ nothing can be written nothing is.
 import hashlib
 import json
 import os
-import zipfile
-import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -31,7 +29,6 @@ LEAST_BYTES: Final = 1 << 22
 """Files below 4 MiB are read in less than a second."""
 
 _MOST_TABLES: Final = 8
-_DAMAGE: Final = (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error)
 
 
 def cache_folder() -> Path | None:
@@ -92,7 +89,8 @@ def _loaded(path: Path) -> BodyTable | None:
         os.utime(path)
     except FileNotFoundError:
         return None
-    except _DAMAGE:
+    except Exception:
+        # Damage comes as any error of zipfile, numpy, zlib or json; none is the user's.
         with suppress(OSError):
             path.unlink()
         return None

@@ -42,7 +42,7 @@ _EXTRA: Final = {
 _FLAGS: Final = slice(161, 165)
 _FLAG_BITS: Final = {"neo": 0x0800, "pha": 0x8000}
 _NAME: Final = slice(166, 194)
-_BETWEEN: Final = (7, 13, 19, 25, 35, 36, 46, 47, 57, 58, 68, 69, 79, 91)
+_BETWEEN: Final = (7, 13, 19, 25, 35, 36, 46, 47, 57, 58, 68, 69, 79, 91, 103, 104)
 """Places that are blank in every line."""
 
 _SNIFFED: Final = 200

@@ -15,6 +15,7 @@ from feasibility.orbits.readers.json_text import JULIAN
 from feasibility.orbits.readers.perihelion import a_of, mean_anomaly_of, mjd_of_calendar
 
 _MIN_A_AU, _MAX_A_AU = A_RANGE_AU
+_NEARLY_OPEN: Final = 0.99
 _CALENDAR: Final = 1e7
 """Numbers from which times are calendar dates such as 19860205.9."""
 _TRUTH: Final = {"Y": 1.0, "N": 0.0, "true": 1.0, "false": 0.0}
@@ -231,11 +232,17 @@ def _row(number: int, cells: Sequence[str], header: Header, julian: bool, all_bo
 
 
 def _unbound(header: Header, cells: Sequence[str]) -> str:
-    """Return the fault of an orbit that is no ellipse, empty for one that is."""
-    for column, cell in zip(header.columns, cells, strict=True):
-        if column.meaning == "e":
-            return UNBOUND if 1.0 <= _float(cell) < math.inf else ""
-    return ""
+    """Return the fault of an orbit that is no ellipse, or nearly none; empty for others."""
+    value = {
+        column.meaning: _float(cell)
+        for column, cell in zip(header.columns, cells, strict=True)
+        if column.meaning in ("a", "e")
+    }
+    e = value.get("e", math.nan)
+    if 1.0 <= e < math.inf:
+        return UNBOUND
+    # A comet from far away, not a semi-major axis in another unit.
+    return TOO_WIDE if e > _NEARLY_OPEN and value.get("a", 0.0) > _MAX_A_AU else ""
 
 
 def _complete(values: dict[str, float]) -> None:

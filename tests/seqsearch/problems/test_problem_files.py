@@ -23,6 +23,7 @@ from seqsearch.problems.problem_file import (
     read_config,
     to_toml,
     with_catalogue,
+    with_selection,
 )
 from seqsearch.problems.registry import plugins
 from seqsearch.pruning.pruner_spec import parse_pruner
@@ -114,6 +115,28 @@ def test_a_catalogue_path_is_relative_to_its_file(tmp_path):
     )
     assert config.catalogue.file == str(tmp_path / "a.txt")
     assert with_catalogue(config, "b.txt").catalogue.file == "b.txt"
+
+
+def test_bodies_are_selected_and_units_stated_by_the_file(tmp_path):
+    table = GOOD.replace("synthetic_bodies = 300", 'synthetic_bodies = 300\nselect = "a < 2.5"')
+    problem = build_problem(read_config(_write(tmp_path, table)))
+    assert 2 <= len(problem.catalogue) < 300
+    assert problem.catalogue.elements[:, 0].max() < 2.5 * 1.496e11
+    with pytest.raises(InputError, match="no column 'H'; columns are id, epoch, a"):
+        build_problem(with_selection(read_config(_write(tmp_path, table)), "H < 16"))
+
+    rows = "".join(f"{k} 61000 2.{k} 0.1 0.1 1 2 3\n" for k in range(1, 9))
+    (tmp_path / "a.txt").write_text("id epoch a e i node argp M\n" + rows)
+    stated = 'file = "a.txt"\nunits = {i = "rad"}\nselect = "i > 5 and id < 6"'
+    config = read_config(_write(tmp_path, GOOD.replace("synthetic_bodies = 300", stated)))
+    assert build_problem(config).catalogue.ids.tolist() == [1, 2, 3, 4, 5]
+    assert with_catalogue(config, "b.txt").catalogue.select == "i > 5 and id < 6"
+    assert read_config(_write(tmp_path, to_toml(config))) == config
+    wrong = GOOD.replace("synthetic_bodies = 300", 'file = "a.txt"\nunits = {i = "grad"}')
+    with pytest.raises(
+        InputError, match=r"unit .grad. of column i is not known; expected deg, rad"
+    ):
+        build_problem(read_config(_write(tmp_path, wrong)))
 
 
 def test_options_override_the_file():
