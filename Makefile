@@ -10,7 +10,7 @@ ifndef CI
 TORCH_INDEX ?= --index-url https://download.pytorch.org/whl/cpu
 endif
 
-.PHONY: demo test lint slow clean
+.PHONY: demo test lint slow docs clean
 
 demo: .venv/.run
 	rm -rf $(DEMO_RUN)
@@ -28,6 +28,10 @@ lint: .venv/.dev
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+docs: .venv/.dev
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
+	@echo "open build/site/index.html"
 
 clean:
 	rm -rf .venv build *.egg-info

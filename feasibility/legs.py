@@ -338,7 +338,13 @@ def _as_array(name: str, value: ArrayLike | None) -> NDArray[Any]:
     dtype = np.int64 if name in ("dep_id", "arr_id") else np.float64
     try:
         array = np.array(plain, dtype=dtype)
+        # numpy cuts fractions off without a word.
+        whole = dtype is np.float64 or np.asarray(plain).dtype.kind in "iu"
+        if not whole and not np.array_equal(array, np.asarray(plain, dtype=np.float64)):
+            raise InputError(f"{label}: expected whole numbers")
     except (TypeError, ValueError, OverflowError) as error:
+        if isinstance(error, InputError):
+            raise
         raise InputError(f"Legs {name}: expected numbers ({error})") from None
     if name in ("rv_dep", "rv_arr"):
         if array.ndim == 1:

@@ -23,7 +23,8 @@ def plain_numbers(label: str, value: Any, units: tuple[str, ...]) -> Any:
     value : object
         Numbers, a quantity, or a list whose entries may be quantities.
     units : tuple of str
-        The unit wanted, as astropy and pint spell it; empty for numbers without one. Several
+        The unit wanted, as astropy and pint spell it, "" for a pure number; no units for numbers
+        that must not have one. Several
         units are those of the entries along the last axis of a table, which has to be given as
         rows of single quantities if it has units at all.
 
@@ -90,4 +91,5 @@ def _converted(label: str, value: Any, unit: str) -> Any:
 
 
 def _wanted(units: tuple[str, ...]) -> str:
-    return f"plain numbers in {' and '.join(dict.fromkeys(units))}" if units else "plain numbers"
+    named = " and ".join(dict.fromkeys(unit for unit in units if unit))
+    return f"plain numbers in {named}" if named else "plain numbers"

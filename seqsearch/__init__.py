@@ -18,7 +18,13 @@ if TYPE_CHECKING:
     from seqsearch.problems.rendezvous import RendezvousProblem
     from seqsearch.settings import SearchSettings
     from seqsearch.tours.checks import Verification
-    from seqsearch.tours.plots import plot_mass, plot_path, plot_thrust, plot_timeline, plot_tour
+    from seqsearch.tours.pictures.plots import (
+        plot_mass,
+        plot_path,
+        plot_thrust,
+        plot_timeline,
+        plot_tour,
+    )
     from seqsearch.tours.tour import Tour
     from seqsearch.tours.tour_files import read_tour
     from seqsearch.tours.verify import verify_tour
@@ -38,11 +44,11 @@ _HOMES = {
     "check_problem": "seqsearch.core.check_problem",
     "check_ranking": "seqsearch.beam.rankings.check",
     "load_problem": "seqsearch.problems.problem_file",
-    "plot_mass": "seqsearch.tours.plots",
-    "plot_path": "seqsearch.tours.plots",
-    "plot_thrust": "seqsearch.tours.plots",
-    "plot_timeline": "seqsearch.tours.plots",
-    "plot_tour": "seqsearch.tours.plots",
+    "plot_mass": "seqsearch.tours.pictures.plots",
+    "plot_path": "seqsearch.tours.pictures.plots",
+    "plot_thrust": "seqsearch.tours.pictures.plots",
+    "plot_timeline": "seqsearch.tours.pictures.plots",
+    "plot_tour": "seqsearch.tours.pictures.plots",
     "read_config": "seqsearch.problems.problem_file",
     "read_tour": "seqsearch.tours.tour_files",
     "search": "seqsearch.beam.beam_search",

@@ -127,7 +127,8 @@ class SearchSettings(_Table, frozen=True, kw_only=True):
         that comes with the package at this recall, or others, such as
         ``"lambert:1.3,mima2:0.97"``; ``"none"`` keeps all.
     solver : str
-        Leg solver for the full optimisation: ``"fast"`` or ``"reference"``.
+        Leg solver for the full optimisation: ``"fast"``, ``"reference"``, ``"best"`` (the better
+        of both) or ``"auto"`` (the reference where the fast one has no solution or may be wrong).
     solves_per_rank : int
         Most hops that are optimised at one rank, the most promising first.
     flyable_per_target : int
@@ -164,7 +165,7 @@ class SearchSettings(_Table, frozen=True, kw_only=True):
     margin_reserve: Annotated[float, Meta(ge=0)] = 0.002
     departure_delays_days: tuple[Annotated[float, Meta(ge=0)], ...] = (0.0,)
     pruner: str = "default:0.99"
-    solver: str = "fast"
+    solver: Literal["fast", "reference", "best", "auto"] = "fast"
     solves_per_rank: _Count = 8000
     flyable_per_target: _Count = 2
     time_weight: Annotated[float, Meta(ge=0)] = 1.0

@@ -10,7 +10,11 @@ interrupted, and --share makes a smaller model of the same kind:
 2. With --hard-rounds N, N times: legs that the last model is most unsure of among several
    times as many (`HARD`), and a training with them too. Not part of the default model, as
    docs/guide/classifier.md says why.
-3. Legs with minimum propellant: `PROPELLANT`; the net for the final mass learns from them.
+3. Legs with minimum propellant: `final_mass_legs.LEGS`; the net for the final mass learns from
+   them.
+
+With --margin-model FILE the first two steps are left out, and only the net for the final mass
+is made.
 
 The families are those of docs/guide/classifier.md. Seeds of training and test differ, and test
 legs have the natural mix of their protocol, without draws at the boundary.
@@ -21,6 +25,15 @@ import sys
 from pathlib import Path
 
 import msgspec
+from final_mass_legs import (
+    FRESH_SEED,
+    LEGS,
+    SEED,
+    TEST_LEGS,
+    TESTS,
+    final_mass_protocol,
+    fresh_protocol,
+)
 
 from feasibility.commands.cli import main as feasibility
 from feasibility.dataset import read_protocol
@@ -30,7 +43,6 @@ from feasibility.learning.margin.hard_examples import harder
 from feasibility.runtime.workers import worker_pool
 
 TRAINING_SEED, TEST_SEED = 11, 7001
-PROPELLANT_SEED, PROPELLANT_TEST_SEED = 12, 7002
 HARD_SEED = 101
 LEGS_PER_SHARD = 1000
 # Family: (legs for training, legs for the test).
@@ -45,15 +57,6 @@ FAMILIES = {
     "craft2900": (11_000, 0),
     "craft3900": (8_000, 3_000),
     "craft5000": (8_000, 0),
-}
-# Family: legs, of which about a third can be flown and carry a final mass.
-PROPELLANT = {
-    "search": (40_000, 6_000),
-    "table1": (12_000, 1_500),
-    "nea": (12_000, 1_500),
-    "general": (16_000, 1_500),
-    "craft2100": (2_000, 0),
-    "craft3900": (2_000, 0),
 }
 # Family: legs of a round of hard examples, the most doubtful of HARD_FACTOR times as many.
 HARD = {"search": 12_000, "table1": 9_000, "nea": 14_000}
@@ -86,14 +89,6 @@ def generate(made: Protocol, legs: int, folder: Path, seed: int, workers: int) -
         generation.run(pool, in_flight=2 * workers)
 
 
-def with_propellant(made: Protocol) -> Protocol:
-    """Return the protocol with minimum propellant, and no dry mass to limit it."""
-    craft = made.spacecraft
-    if craft is not None:
-        craft = msgspec.structs.replace(craft, dry_mass_kg=0.0)
-    return msgspec.structs.replace(made, propellant=True, spacecraft=craft)
-
-
 def natural(made: Protocol) -> Protocol:
     """Return the protocol without draws at the boundary."""
     return msgspec.structs.replace(made, boundary_share=0.0)
@@ -107,6 +102,7 @@ def main() -> int:
     parser.add_argument("--workers", type=int, default=2, help="processes (default 2)")
     parser.add_argument("--epochs", default="34", help="of the training (default 34)")
     parser.add_argument("--hard-rounds", type=int, default=0, help="of hard examples (default 0)")
+    parser.add_argument("--margin-model", type=Path, help="keep the margins of this model")
     parser.add_argument("--shared", type=Path, default=Path("../shared"), help="data folder")
     options = parser.parse_args()
     tables = options.shared / "gtoc" / "official"
@@ -123,25 +119,29 @@ def main() -> int:
             raise SystemExit(1)
         return model
 
-    learned, test = [], []
-    for family, (legs, test_legs) in FAMILIES.items():
-        made = protocol(family, tables)
-        learned.append(dataset("train", family, made, legs, TRAINING_SEED))
-        if test_legs:
-            test.append(dataset("test", family, natural(made), test_legs, TEST_SEED))
-    model = train(learned, "margin")
-    for round_ in range(1, options.hard_rounds + 1):
-        for family, legs in HARD.items():
-            made = harder(protocol(family, tables), model, HARD_FACTOR)
-            learned.append(dataset(f"hard{round_}", family, made, legs, HARD_SEED + round_))
-        model = train(learned, f"margin-hard{round_}")
-    flown = []
-    for family, (legs, test_legs) in PROPELLANT.items():
-        made = with_propellant(protocol(family, tables))
-        flown.append(dataset("propellant", family, made, legs, PROPELLANT_SEED))
-        if test_legs:
-            made = natural(made)
-            test.append(dataset("test-propellant", family, made, test_legs, PROPELLANT_TEST_SEED))
+    def margins() -> tuple[Path, list[str]]:
+        learned, test = [], []
+        for family, (legs, test_legs) in FAMILIES.items():
+            made = protocol(family, tables)
+            learned.append(dataset("train", family, made, legs, TRAINING_SEED))
+            if test_legs:
+                test.append(dataset("test", family, natural(made), test_legs, TEST_SEED))
+        model = train(learned, "margin")
+        for round_ in range(1, options.hard_rounds + 1):
+            for family, legs in HARD.items():
+                made = harder(protocol(family, tables), model, HARD_FACTOR)
+                learned.append(dataset(f"hard{round_}", family, made, legs, HARD_SEED + round_))
+            model = train(learned, f"margin-hard{round_}")
+        return model, test
+
+    model, test = (options.margin_model, []) if options.margin_model else margins()
+    flown = [
+        dataset("final-mass", family, final_mass_protocol(family, tables), legs, SEED)
+        for family, legs in LEGS.items()
+    ]
+    for family in TESTS:
+        made = fresh_protocol(family, tables)
+        test.append(dataset("test-final-mass", family, made, TEST_LEGS, FRESH_SEED))
     whole = str(options.out / "default.seqmodel")
     final_mass = ["train", *flown, "--model", "final-mass", "--start", str(model), "--seed", "1"]
     return feasibility([*final_mass, "--out", whole]) or feasibility(["evaluate", whole, *test])

@@ -12,11 +12,11 @@ FLOORS = {
         {"report": "a run as one HTML page"},
         {"runs": "run folder, checkpoints, sessions, resuming, fleets"},
         {"beam": "the search: passes, ranks, expanders, frontiers, rankings, scouting"},
-        {"polish": "all epochs of a tour at once, other bodies at its ends"},
+        {"polish": "all epochs of a tour at once", "refine": "continuous thrust"},
         {"problems": "one folder a problem, found by entry points; problem files"},
         {"pruning": "pruners by name, pruning of hops, the audit"},
         {"core": "the words: problem contract, nodes, hops, candidates, tree"},
-        {"tours": "what is found: record, files, exports, events, scores, verify, plots"},
+        {"tours": "what is found: record, files, verify, plots", "fetching": "JPL, MPC"},
         {"settings": "[search]", "budget": "when to stop", "deadline": "the clock"},
     ],
     "feasibility": [
@@ -25,7 +25,7 @@ FLOORS = {
         {"learning": "training: the margin model, the paper's models"},
         {"evaluation": "metrics and peers", "pruners": "which legs to keep"},
         {"classifier": "a trained model, asked", "dataset": "labelled legs"},
-        {"sims_flanagan": "leg solvers: fast/ and reference/"},
+        {"sims_flanagan": "leg solvers", "continuous": "constant thrust by days"},
         {"orbits": "Kepler, elements, Lambert, MIMA, catalogues, neighbours"},
         {"legs": "Legs and Spacecraft, the one thing that all parts exchange"},
         {"runtime": "files, processes, kernels, TOML, the guarded import of pykep"},
@@ -38,8 +38,8 @@ FLOORS = {
 NOTES = (
     "An arrow means: may import. A room knows the rooms on lower floors of its package and none "
     "above it. seqsearch uses feasibility, never the other way round.",
-    "tours.verify reaches neither core, beam and problems nor the solvers, kernels and orbits of "
-    "feasibility: what checks a tour shares nothing with what found it.",
+    "tours.verify and verify_rows reach neither core, beam and problems nor the solvers, kernels "
+    "and orbits of feasibility: what checks a tour shares nothing with what found it.",
 )
 
 TITLES = {

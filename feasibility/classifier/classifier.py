@@ -41,7 +41,8 @@ class FeasibilityClassifier:
     Raises
     ------
     InputError
-        The artefact has features or a kind of model that this version does not know.
+        The artefact has features or a kind of model that this version does not know, or arrays
+        that do not fit together.
 
     Examples
     --------
@@ -54,6 +55,7 @@ class FeasibilityClassifier:
     """
 
     def __init__(self, artefact: Artefact) -> None:
+        check_model(artefact)
         self.artefact = artefact
         self._estimator: MarginEstimator | PaperEstimator
         if artefact.feature_set == paper.FEATURE_SET:
@@ -87,7 +89,6 @@ class FeasibilityClassifier:
         if path != DEFAULT:
             artefact = Artefact.load(Path(path))
             try:
-                check_model(artefact)
                 return cls(artefact)
             except InputError as error:
                 raise InputError(f"{path}: {error}") from None
@@ -158,6 +159,20 @@ class FeasibilityClassifier:
             As for `margin`.
         """
         return self.predict(legs).final_mass
+
+    def final_mass_error(self, legs: Legs) -> NDArray[np.float64]:
+        """Return (n,) kg, how far `final_mass` is at most from the truth on 68 % of such legs.
+
+        As one standard deviation would say. The truth is the solution with least propellant.
+        NaN where nothing is known, where the leg is evidently too heavy (margin below 0.95), and
+        for models without final masses. `predict` gives both from one computation.
+
+        Raises
+        ------
+        InputError
+            As for `margin`.
+        """
+        return self.predict(legs).final_mass_error
 
     def predict(self, legs: Legs) -> LegPrediction:
         """Return margin, probability, final mass and more of n legs, at the cost of one of them.

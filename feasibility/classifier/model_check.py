@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.classifier.artefact import Artefact
+from feasibility.classifier.margin.final_mass import BOUND_INPUTS, FINAL_MASS_INPUTS
 from feasibility.errors import InputError
 
 _Arrays = Mapping[str, NDArray[Any]]
@@ -82,6 +83,13 @@ def _check_margin(artefact: Artefact) -> None:
             std = _numbers(arrays, "std", inputs)
             _expect(bool(np.all(std > 0.0)), f"array {section}/std, expected more than zero")
             _one(arrays, "unit")
+    mass = artefact.section("final_mass")
+    if mass:
+        k = len(mass["mean"])
+        known = (len(BOUND_INPUTS), len(FINAL_MASS_INPUTS))
+        _expect(k in known, f"final_mass: {k} inputs, expected {known[0]} or {known[1]}")
+        if "error_fit" in mass:
+            _numbers(mass, "error_fit", 3)
     k = artefact.section("model")["weight_0"].shape[1]
     _expect(k == len(artefact.features), f"{len(artefact.features)} features for {k} inputs")
     _numbers(artefact.section("quick"), "settled", 2)

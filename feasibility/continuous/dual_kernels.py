@@ -111,7 +111,7 @@ def evaluate(
                 if e > delay[2] and e < delay[3]:
                     hessian[i, j] += g[i] * g[j] / delay[1]
     delay[4] = e
-    return value
+    return float(value)
 
 
 @inner_kernel

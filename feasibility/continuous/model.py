@@ -12,6 +12,9 @@ from feasibility.continuous.leg import ContinuousLeg, Scale
 
 _Array = NDArray[np.float64]
 
+_FULL: Final = 1.0 - 1e-12
+"""Share of the engine's thrust that is used, so that rounding never makes it more."""
+
 _STIFF: Final = 1e14
 """Price of half the squared gap: leaves a gap of the multipliers' size times its inverse."""
 
@@ -148,6 +151,11 @@ class LegModel:
         Earliest and latest arrival.
     price : float
         Price of a delay, in time at full thrust.
+
+    Attributes
+    ----------
+    full_thrust_n : float
+        Thrust of a throttle of size 1.
     """
 
     def __init__(
@@ -156,16 +164,17 @@ class LegModel:
         self.leg = leg
         self.scale = Scale.of(leg.mu_m3_s2)
         self.price_per_day = price / self.scale.days
+        self.full_thrust_n = leg.thrust_n * _FULL
         self._window = arrival_mjd2000
 
     @cached_property
     def _push(self) -> float:
         unit = self.scale.length_m / self.scale.time_s**2
-        return self.leg.thrust_n / self.leg.m0_kg / unit
+        return self.full_thrust_n / self.leg.m0_kg / unit
 
     @cached_property
     def _burn(self) -> float:
-        flow = self.leg.thrust_n / self.leg.exhaust_velocity_m_s
+        flow = self.full_thrust_n / self.leg.exhaust_velocity_m_s
         return flow / self.leg.m0_kg * self.scale.time_s
 
     @cached_property

@@ -164,7 +164,7 @@ def _arc(model: LegModel, point: Point, converged: bool, iterations: int) -> Con
         edges_mjd2000=point.edges_mjd2000,
         states=model.scale.si(point.nodes[:, :6]),
         mass_kg=point.nodes[:, 6] * leg.m0_kg,
-        thrust_n=point.throttles * leg.thrust_n,
+        thrust_n=point.throttles * model.full_thrust_n,
         miss_km=float(np.linalg.norm(gap[:3])) / 1e3,
         miss_m_s=float(np.linalg.norm(gap[3:])),
         converged=converged,

@@ -2,7 +2,7 @@
 
 import functools
 import hashlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final, final
 
@@ -17,7 +17,7 @@ from feasibility.errors import InputError
 from feasibility.legs import Legs
 from feasibility.orbits import Catalogue, read_catalogue, synthetic_main_belt
 from feasibility.orbits.lambert import lambert_delta_v
-from feasibility.sims_flanagan import Status, optimise, solve_max_initial_mass
+from feasibility.sims_flanagan import LegSolutions, Status, optimise, solve_max_initial_mass
 
 LAMBERT_REVOLUTIONS: Final = 2
 """Revolutions of the Lambert branches that the column lambert_dv_m_s compares."""
@@ -100,7 +100,8 @@ def make_shard(task: ShardTask) -> Columns:
     """
     protocol = task.protocol
     sequence = np.random.SeedSequence(task.seed, spawn_key=(task.shard,))
-    sampling, boundary, starts = (np.random.default_rng(child) for child in sequence.spawn(3))
+    children = (np.random.default_rng(child) for child in sequence.spawn(4))
+    sampling, boundary, starts, margins = children
     catalogue = load_catalogue(protocol.catalogue, task.catalogue_sha256)
     full = protocol.legs_per_shard
     draw = protocol.sampler.draw(
@@ -111,6 +112,11 @@ def make_shard(task: ShardTask) -> Columns:
     log_ratio = protocol.boundary_sigma * boundary.standard_normal(full)[: task.rows]
     if protocol.label == "convergence":
         labels = _convergence_labels(draw, protocol.solver, starts)
+    elif protocol.margin_range is not None:
+        # Again for the whole shard.
+        low, high = (float(np.log(margin)) for margin in protocol.margin_range)
+        log_margin = margins.uniform(low, high, full)[: task.rows]
+        labels = _margin_range_labels(draw, protocol, log_margin)
     else:
         labels = _margin_labels(draw, protocol, chosen, log_ratio)
     legs: Legs = labels.pop("legs")
@@ -128,7 +134,33 @@ def _margin_labels(
 ) -> dict[str, Any]:
     heaviest = solve_max_initial_mass(draw.legs, method=protocol.solver)
     m_star = np.where(heaviest.converged, heaviest.m0, np.nan)
-    legs, redrawn = _at_boundary(draw, m_star, chosen, log_ratio)
+    near = m_star * np.exp(log_ratio)
+    redrawn = chosen & (near >= draw.m0_min) & (near <= draw.m0_max)
+    legs = _with_masses(draw.legs, np.where(redrawn, near, draw.legs.m0))
+    return _flown_labels(legs, protocol, heaviest, redrawn)
+
+
+def _margin_range_labels(
+    draw: Draw, protocol: Protocol, log_margin: NDArray[np.float64]
+) -> dict[str, Any]:
+    """Label legs with masses that follow from m*, several of them for each leg drawn."""
+    rows = np.arange(len(draw.legs))
+    first = rows - rows % protocol.masses_per_leg
+    some, again = np.unique(first, return_inverse=True)
+    heaviest = solve_max_initial_mass(draw.legs.take(some), method=protocol.solver).take(again)
+    seconds = np.where(rows == first, heaviest.seconds, 0.0)
+    heaviest = replace(heaviest, seconds=seconds)
+    m_star = np.where(heaviest.converged, heaviest.m0, draw.legs.m0[first])
+    wanted = np.clip(m_star * np.exp(-log_margin), draw.m0_min[first], draw.m0_max[first])
+    legs = _with_masses(draw.legs.take(first), wanted)
+    return _flown_labels(legs, protocol, heaviest, np.ones(len(rows), dtype=np.bool_))
+
+
+def _flown_labels(
+    legs: Legs, protocol: Protocol, heaviest: LegSolutions, redrawn: NDArray[np.bool_]
+) -> dict[str, Any]:
+    """Return the columns of legs whose m* is known, with minimum propellant if wanted."""
+    m_star = np.where(heaviest.converged, heaviest.m0, np.nan)
     log_margin = np.log(m_star / legs.m0)
     flyable = log_margin >= 0.0
     status = np.where(heaviest.converged, Status.TOO_HEAVY, Status.NOT_CONVERGED).astype(np.int8)
@@ -153,24 +185,14 @@ def _margin_labels(
     }
 
 
-def _at_boundary(
-    draw: Draw,
-    m_star: NDArray[np.float64],
-    chosen: NDArray[np.bool_],
-    log_ratio: NDArray[np.float64],
-) -> tuple[Legs, NDArray[np.bool_]]:
-    """Return the legs with the chosen masses drawn again near m*, and which these are.
+def _with_masses(legs: Legs, m0: NDArray[np.float64]) -> Legs:
+    """Return the legs with other initial masses.
 
-    A mass that would leave the protocol's range keeps its first draw. Where
-    the range reaches below a row's dry mass (drawn spacecraft), the dry mass
-    keeps its ratio to the initial mass.
+    Where a mass is below a row's dry mass (drawn spacecraft), the dry mass keeps its ratio to
+    the initial mass.
     """
-    legs = draw.legs
-    near = m_star * np.exp(log_ratio)
-    redrawn = chosen & (near >= draw.m0_min) & (near <= draw.m0_max)
-    m0 = np.where(redrawn, near, legs.m0)
     m_dry = np.where(m0 < legs.m_dry, legs.m_dry / legs.m0 * m0, legs.m_dry)
-    moved = Legs(
+    return Legs(
         rv_dep=legs.rv_dep,
         rv_arr=legs.rv_arr,
         tof_days=legs.tof_days,
@@ -182,7 +204,6 @@ def _at_boundary(
         dep_id=legs.dep_id,
         arr_id=legs.arr_id,
     )
-    return moved, redrawn
 
 
 def _convergence_labels(draw: Draw, solver: str, rng: np.random.Generator) -> dict[str, Any]:
@@ -207,8 +228,10 @@ def _leg_columns(legs: Legs, task: ShardTask) -> Columns:
     assert legs.dep_id is not None
     assert legs.arr_id is not None
     assert legs.t_dep_mjd2000 is not None
-    # Drawn orbits get ids of their own, so that splits by pair keep them apart.
-    row = task.shard * task.protocol.legs_per_shard + np.arange(len(legs), dtype=np.int64)
+    # Drawn orbits get ids of their own, so that splits by pair keep them apart; rows of one leg
+    # with several masses share them.
+    row = np.arange(len(legs), dtype=np.int64)
+    row += task.shard * task.protocol.legs_per_shard - row % task.protocol.masses_per_leg
     columns = {
         "dep_id": np.where(legs.dep_id == -1, -2 * row - 1, legs.dep_id),
         "arr_id": np.where(legs.arr_id == -1, -2 * row - 2, legs.arr_id),

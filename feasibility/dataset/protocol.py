@@ -20,6 +20,8 @@ else:
     # A file names one of ours; a caller may hand over any other.
     _Sampler = NamedSampler
 
+_Positive = Annotated[float, Meta(gt=0)]
+
 
 class _Table(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A TOML table in which every key is known."""
@@ -70,8 +72,8 @@ class Protocol(_Table, frozen=True, kw_only=True):
     label : "margin" or "convergence"
         What makes a leg feasible: initial mass up to m*, or, as in the paper,
         that the minimum-propellant problem converged from one random start.
-    solver : "fast" or "reference"
-        Leg solver of m*, and of the minimum propellant.
+    solver : "fast", "reference", "best" or "auto"
+        Leg solver of m*, and of the minimum propellant, as `method` of `optimise`.
     propellant : bool
         Whether the minimum-propellant problem is solved where the leg is flyable
         (margin label only).
@@ -79,6 +81,13 @@ class Protocol(_Table, frozen=True, kw_only=True):
         Share of rows whose initial mass is drawn again, near m*, after solving.
     boundary_sigma : float
         Standard deviation of log(m0 / m*) of those rows.
+    margin_range : pair of float, optional
+        Range of m* / m0, log-uniform, from which the initial masses of all rows are drawn after
+        solving, so that every leg can be flown where it begins at 1; margin label only, and
+        without `boundary_share`. The sampler's range of masses is not exceeded.
+    masses_per_leg : int
+        Rows that differ in the initial mass alone: m* is found once for them, which is most
+        of the work. With `margin_range` only.
     legs_per_shard : int
         Rows of one Parquet file: the unit of work and of random numbers.
     """
@@ -86,10 +95,12 @@ class Protocol(_Table, frozen=True, kw_only=True):
     name: str
     description: str = ""
     label: Literal["margin", "convergence"] = "margin"
-    solver: Literal["fast", "reference"] = "fast"
+    solver: Literal["fast", "reference", "best", "auto"] = "fast"
     propellant: bool = True
     boundary_share: Annotated[float, Meta(ge=0, le=1)] = 0.0
     boundary_sigma: Annotated[float, Meta(gt=0)] = 0.05
+    margin_range: tuple[_Positive, _Positive] | None = None
+    masses_per_leg: Annotated[int, Meta(ge=1, le=1000)] = 1
     legs_per_shard: Annotated[int, Meta(ge=1, le=1_000_000)] = 2000
     sampler: _Sampler
     spacecraft: SpacecraftTable | None = None
@@ -97,6 +108,7 @@ class Protocol(_Table, frozen=True, kw_only=True):
     impulsive_grid: ImpulsiveGrid = msgspec.field(default_factory=ImpulsiveGrid)
 
     def __post_init__(self) -> None:
+        self._check_margins()
         if self.sampler.draws_spacecraft:
             if self.spacecraft is not None:
                 raise ValueError("this sampler draws its own; expected no [spacecraft]")
@@ -112,6 +124,18 @@ class Protocol(_Table, frozen=True, kw_only=True):
         if fault is not None:
             raise ValueError(f"thrust_n: {fault}")
 
+    def _check_margins(self) -> None:
+        """Raise ValueError where `margin_range` does not fit the rest."""
+        if self.margin_range is None:
+            if self.masses_per_leg > 1:
+                raise ValueError("masses_per_leg: expected a margin_range with it")
+            return
+        low, high = self.margin_range
+        if low > high:
+            raise ValueError(f"margin_range = [{low:g}, {high:g}], expected the smaller one first")
+        if self.label != "margin" or self.boundary_share > 0:
+            raise ValueError('margin_range: expected label = "margin" and no boundary_share')
+
     def craft(self) -> Spacecraft | None:
         """Return the one spacecraft, None where each leg has its own."""
         table = self.spacecraft
@@ -126,6 +150,10 @@ class Protocol(_Table, frozen=True, kw_only=True):
     def to_dict(self) -> dict[str, Any]:
         """Return every setting as plain data, as JSON and TOML have it."""
         plain: dict[str, Any] = msgspec.to_builtins(self)
+        # Datasets of versions that did not know these can still be completed.
+        for name in ("margin_range", "masses_per_leg"):
+            if plain[name] in (None, 1):
+                del plain[name]
         kind = type(self.sampler)
         # Structs with a tag write it themselves; other samplers are told apart by their class.
         plain["sampler"] = {"kind": f"{kind.__module__}.{kind.__qualname__}"} | plain["sampler"]

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.classifier.classifier import FeasibilityClassifier
+from feasibility.classifier.margin.prediction import LegPrediction
 from feasibility.dataset import Dataset
 from feasibility.evaluation.metrics import Confusion, reliability, roc_curve, summary
 from feasibility.evaluation.peers import Peer, PeerOutcome, ask, near_boundary
@@ -64,7 +65,8 @@ class Evaluation:
         `metrics.summary` at threshold 0.5, ``in_domain``, the share of legs within the
         model's domain, and ``accuracy_within_15_percent`` and so on where margins are known; for
         a model that knows margins the errors of log(m*/m0), and of the final mass where the
-        dataset has it, relative. ``us_per_leg`` is processor time.
+        dataset has it, relative, with the share of final masses that are as near as the model
+        says. ``us_per_leg`` is processor time.
     pruning : tuple of dict
         For each of `RECALLS`: threshold, recall met, and share of the infeasible legs pruned.
     true_log_margin, log_margin : (n,) float64, optional
@@ -199,14 +201,14 @@ def evaluate(
         return Evaluation(y, probability, metrics, pruning, peers=others)
     answers = classifier.predict(part.legs)
     estimate = np.log(answers.margin)
-    metrics |= _errors(estimate, true, answers.final_mass, part.columns["m_final_kg"])
+    metrics |= _errors(estimate, true, answers, part.columns["m_final_kg"])
     return Evaluation(y, probability, metrics, pruning, true, estimate, others)
 
 
 def _errors(
     estimate: NDArray[np.float64],
     true: NDArray[np.float64],
-    final_mass: NDArray[np.float64],
+    answers: LegPrediction,
     true_final_mass: NDArray[np.float64],
 ) -> dict[str, float]:
     """Return the errors of log(m*/m0) and of the final mass, where both sides are known."""
@@ -220,12 +222,14 @@ def _errors(
     if near.any():
         errors["median_log_margin_error_near"] = float(np.median(error[near]))
         errors["mean_log_margin_error_near"] = float(np.mean(error[near]))
-    miss = np.abs(final_mass / true_final_mass - 1.0)
+    miss = np.abs(answers.final_mass / true_final_mass - 1.0)
     # A leg that the model thinks too heavy has no estimate of its least propellant.
     flown = np.isfinite(miss) & (estimate >= 0.0)
     if flown.any():
         errors["median_final_mass_error"] = float(np.median(miss[flown]))
         errors["mean_final_mass_error"] = float(np.mean(miss[flown]))
+        within = miss * true_final_mass < answers.final_mass_error
+        errors["final_mass_within_error"] = float(np.mean(within[flown]))
     return errors
 
 

@@ -1,10 +1,10 @@
-"""`Catalogue`: many bodies on Kepler orbits, and where they are at any epoch."""
+"""`Catalogue`: many bodies, and where they are at any epoch: on Kepler orbits, or as told."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from types import MappingProxyType
-from typing import Any, final
+from typing import Any, Final, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,16 +12,23 @@ from numpy.typing import ArrayLike, NDArray
 from feasibility.constants import DAY_S, MU_SUN
 from feasibility.errors import InputError
 from feasibility.orbits.classical import perifocal_axes
+from feasibility.orbits.spk.kernel_table import KernelTable
+from feasibility.quantities import plain_numbers
 from feasibility.runtime.text_column import TextColumn, taken_texts
+
+_ELEMENT_UNITS: Final = ("m", "", "rad", "rad", "rad", "rad")
 
 
 @final
 @dataclass(frozen=True, eq=False, repr=False)
 class Catalogue:
-    """Bodies in heliocentric two-body motion, one row a body.
+    """Bodies in heliocentric motion, one row a body.
+
+    An `feasibility.orbits.spk.Ephemeris` of two-body motion, unless another one is given.
 
     With n the number of bodies. Arrays are copied once, validated once and
-    made read-only.
+    made read-only. Quantities with units (astropy, pint) are converted; elements, which have
+    several units, as rows of single quantities.
 
     Parameters
     ----------
@@ -40,13 +47,15 @@ class Catalogue:
     extra : mapping of str to array_like, optional
         (n,) float64 each: further numeric columns of the table by name, in its units; values
         may be NaN. Motion does not depend on them.
+    ephemeris : KernelTable, optional
+        How the bodies move instead of by their elements, which then osculate.
 
     Raises
     ------
     InputError
-        A shape does not fit, an epoch or element is not finite, an orbit is not an
-        ellipse (a <= 0 or e outside [0, 1)), or an id occurs twice. The message names
-        the first bad row.
+        A shape does not fit, a unit cannot be converted, an epoch or element is not finite,
+        an orbit is not an ellipse (a <= 0 or e outside [0, 1)), or an id occurs twice. The
+        message names the first bad row.
 
     Examples
     --------
@@ -62,6 +71,7 @@ class Catalogue:
     elements: NDArray[np.float64]
     source: str
     extra: Mapping[str, NDArray[np.float64]]
+    ephemeris: KernelTable | None
 
     def __init__(
         self,
@@ -71,9 +81,10 @@ class Catalogue:
         elements: ArrayLike,
         source: str,
         extra: Mapping[str, ArrayLike] | None = None,
+        ephemeris: KernelTable | None = None,
     ) -> None:
         id_column = _integers("Catalogue ids", ids)
-        element_rows = np.array(elements, dtype=np.float64)
+        element_rows = _numbers("Catalogue elements", elements, _ELEMENT_UNITS)
         n = len(id_column)
         if n == 0:
             element_rows = element_rows.reshape(0, 6)
@@ -84,12 +95,14 @@ class Catalogue:
             )
         if len(names) != n:
             raise InputError(f"Catalogue names: {len(names)} names, expected {n}, one an id")
-        epochs = np.array(epoch_mjd2000, dtype=np.float64)
+        epochs = _numbers("Catalogue epoch_mjd2000", epoch_mjd2000, ("day",))
         if epochs.shape not in ((), (1,), (n,)):
             raise InputError(
                 f"Catalogue epoch_mjd2000: expected shape ({n},) or one value, got {epochs.shape}"
             )
         epochs = np.broadcast_to(epochs, (n,)).copy()
+        if ephemeris is not None and len(ephemeris) != n:
+            raise InputError(f"Catalogue ephemeris: has {len(ephemeris)} bodies, expected {n}")
         _check_orbits(epochs, element_rows)
         _check_distinct(id_column)
         columns = {name: _extra_column(name, column, n) for name, column in (extra or {}).items()}
@@ -102,6 +115,7 @@ class Catalogue:
         object.__setattr__(self, "elements", element_rows)
         object.__setattr__(self, "source", source)
         object.__setattr__(self, "extra", MappingProxyType(columns))
+        object.__setattr__(self, "ephemeris", ephemeris)
 
     def __len__(self) -> int:
         return len(self.ids)
@@ -209,6 +223,8 @@ class Catalogue:
         from feasibility.orbits.catalogue_kernels import propagate_rows
 
         index, epochs = self.checked_queries(rows, t_mjd2000)
+        if self.ephemeris is not None:
+            return self.ephemeris.states_at(index, epochs)
         states: NDArray[np.float64] = propagate_rows(self._orbits, index, epochs)
         return states
 
@@ -258,6 +274,7 @@ class Catalogue:
             elements=self.elements[index],
             source=self.source,
             extra={name: column[index] for name, column in self.extra.items()},
+            ephemeris=None if self.ephemeris is None else self.ephemeris.select(index),
         )
 
     def _checked_rows(self, rows: ArrayLike) -> NDArray[np.int64]:
@@ -295,6 +312,16 @@ class Catalogue:
         return packed
 
 
+def _numbers(label: str, values: ArrayLike, units: tuple[str, ...]) -> NDArray[np.float64]:
+    """Return a copy as float64, of quantities with units in the given ones."""
+    try:
+        return np.array(plain_numbers(label, values, units), dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(f"{label}: expected numbers ({error})") from None
+
+
 def _integers(what: str, values: ArrayLike) -> NDArray[np.int64]:
     array = np.atleast_1d(np.asarray(values))
     if array.size == 0:
@@ -308,8 +335,11 @@ def _integers(what: str, values: ArrayLike) -> NDArray[np.int64]:
 
 def _extra_column(name: str, values: ArrayLike, n: int) -> NDArray[np.float64]:
     try:
-        column = np.array(values, dtype=np.float64)
-    except (TypeError, ValueError):
+        plain = plain_numbers(f"Catalogue extra {name!r}", values, ())
+        column = np.array(plain, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        if isinstance(error, InputError):
+            raise
         raise InputError(f"Catalogue extra {name!r}: expected numbers") from None
     if column.shape != (n,):
         raise InputError(

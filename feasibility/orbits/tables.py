@@ -29,7 +29,8 @@ has names in single quotes, and 2 lists the Earth as group 5 after its 910 aster
 out: a table is read for its asteroids, and `earth` has the Earth. What a table has beside ids,
 names and orbits (group, mass, H, ...) is in the catalogue's `extra` by the column's name. Comets
 may have ``q`` and ``tp`` (MJD, Julian date or YYYYMMDD.D) in place of a and M. Empty lines and
-comments (``#``, ``%``) are skipped; files may be gzipped.
+comments (``#``, ``%``) are skipped; files may be gzipped. Kernels are no tables, but are read too:
+an SPK kernel, a folder of them or a meta-kernel, see `feasibility.orbits.spk.reading`.
 """
 
 import warnings
@@ -52,7 +53,8 @@ from feasibility.orbits.readers.mpc_json import mpc_json_bodies
 from feasibility.orbits.readers.mpcorb import is_mpcorb, mpcorb_bodies
 from feasibility.orbits.readers.sbdb import sbdb_bodies
 from feasibility.orbits.readers.text import read_bytes, text_lines, unpacked
-from feasibility.orbits.selection import selected_bodies
+from feasibility.orbits.selection import selected_bodies, selected_rows
+from feasibility.orbits.spk.files import is_kernel
 
 _NODE_LAST: Final = ("epoch", "a", "e", "i", "argp", "node", "M")
 _KNOWN: Final = {
@@ -107,6 +109,8 @@ def read_catalogue(
         understood or is empty. The message names the file, the line and what was expected.
     """
     file = Path(path)
+    if is_kernel(file):
+        return _kernel_catalogue(file, dict(units or {}), select)
     bodies = read_bodies(file, units=units)
     for note in bodies.notes:
         warnings.warn(f"{file}{note}", stacklevel=2)
@@ -139,12 +143,27 @@ def read_bodies(path: str | PathLike[str], *, units: Mapping[str, str] | None = 
         As `read_catalogue`.
     """
     file = Path(path)
-    data = read_bytes(file)
     given = dict(units or {})
+    if is_kernel(file):
+        # Imported here: tables have no need of SPICE.
+        from feasibility.orbits.spk.body_table import kernel_bodies
+
+        return _of_fixed_units(file, kernel_bodies(file), given)
+    data = read_bytes(file)
     with cached_table(data, given) as cached:
         if cached.table is None:
             cached.table = _read(file, unpacked(file, data), given)
         return cached.table
+
+
+def _kernel_catalogue(file: Path, units: dict[str, str], select: str | None) -> Catalogue:
+    # Imported here: tables have no need of SPICE.
+    from feasibility.orbits.spk.reading import read_kernels
+
+    if units:
+        raise InputError(f"{file}: units are given, but SPK kernels have their own; expected none")
+    catalogue = read_kernels(file)
+    return catalogue if select is None else selected_rows(catalogue, select)
 
 
 def _read(file: Path, data: bytes, units: dict[str, str]) -> BodyTable:

@@ -78,18 +78,48 @@ def throttles_to_impulses(
     (n, s, 3) float64, m/s
         In the frame of the throttles.
     """
+    before, after = segment_masses(throttles, m0, m_final, thrust, exhaust_velocity, tof_days)
+    n_segments = throttles.shape[1]
+    acting = np.where(np.arange(n_segments) < n_segments // 2, before, after)
+    push = thrust * tof_days / n_segments * DAY_S
+    dv: _Array = throttles * (push[:, None] / acting)[:, :, None]
+    return dv
+
+
+def segment_masses(
+    throttles: _Array,
+    m0: _Array,
+    m_final: _Array,
+    thrust: _Array,
+    exhaust_velocity: _Array,
+    tof_days: _Array,
+) -> tuple[_Array, _Array]:
+    """Return the masses before and after each impulse.
+
+    Parameters
+    ----------
+    throttles, m0, m_final, thrust, exhaust_velocity, tof_days
+        As for `throttles_to_impulses`.
+
+    Returns
+    -------
+    before, after : (n, s) float64, kg
+        Forward from the initial mass in the first s // 2 segments, backward from the final
+        mass in the others.
+    """
     n_segments = throttles.shape[1]
     forward = n_segments // 2
     push = thrust * tof_days / n_segments * DAY_S
     norms = np.linalg.norm(throttles, axis=2)
-    acting = np.empty(norms.shape)
+    before, after = np.empty(norms.shape), np.empty(norms.shape)
     mass = m0
     for k in range(forward):
-        acting[:, k] = mass
+        before[:, k] = mass
         mass = mass * np.exp(-push * norms[:, k] / mass / exhaust_velocity)
+        after[:, k] = mass
     mass = m_final
     for k in range(n_segments - 1, forward - 1, -1):
-        acting[:, k] = mass
+        after[:, k] = mass
         mass = mass * np.exp(push * norms[:, k] / mass / exhaust_velocity)
-    dv: _Array = throttles * (push[:, None] / acting)[:, :, None]
-    return dv
+        before[:, k] = mass
+    return before, after

@@ -14,13 +14,6 @@ MISMATCH_TOLERANCE: Final = 1e-6
 THROTTLE_TOLERANCE: Final = 1e-6
 """By how much the norm of a throttle may exceed 1 through rounding in a solver."""
 
-
-LIGHT: Final = 4.0
-"""A leg this many times lighter than m* may burn less on another arc than on that of m*.
-
-Below it two-impulse arcs won on fewer than 1 % of belt legs.
-"""
-
 TWO_IMPULSE: Final = 50
 """`LegSolutions.start` of the cheapest two-impulse arc; the next ones follow."""
 

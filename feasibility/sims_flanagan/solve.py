@@ -11,13 +11,25 @@ from feasibility.constants import G0, MU_SUN
 from feasibility.errors import InputError
 from feasibility.legs import Legs
 from feasibility.sims_flanagan.pykep_leg import N_SEGMENTS
-from feasibility.sims_flanagan.solutions import LegSolutions
+from feasibility.sims_flanagan.solutions import LegSolutions, Status
 
 DEFAULT_METHOD: Final = "fast"
 """Method of all solves that do not name one."""
 
 BOTH: Final = "best"
 """Method that asks both solvers and takes, for each leg, the better solution."""
+
+CAREFUL: Final = "auto"
+"""Method that asks the reference too where the fast solver has no solution or may be wrong."""
+
+METHODS: Final = ("fast", "reference", BOTH, CAREFUL)
+"""Names of all methods."""
+
+MASS_ROUNDING: Final = 1e-6
+"""Relative excess of an initial mass over m* that is put down to rounding."""
+
+_ECCENTRIC: Final = 0.75
+"""Eccentricity of either orbit beyond which a fifth of the fast solver's m* is too small."""
 
 _HOME = "feasibility.sims_flanagan"
 _MAXIMUM_MASS: Final = {
@@ -45,8 +57,10 @@ def max_initial_mass(
         n legs; their `m0` and `m_dry` play no part.
     method : str
         Solver: "fast", our own batch solver, "reference", pykep's leg with
-        pygmo's IPOPT and SLSQP, a hundred times slower, or "best", the better
-        solution of both. All are confirmed by pykep's leg.
+        pygmo's IPOPT and SLSQP, a hundred times slower, "best", the better
+        solution of both, or "auto", which is "fast" but for the legs that it does not
+        solve, and those from or to orbits of eccentricity above 0.75: for these it is "best".
+        All are confirmed by pykep's leg.
     n_segments : int
         Segments of each leg, s, two or more. More come nearer to continuous thrust:
         20 shift m* by up to half a per cent.
@@ -107,6 +121,8 @@ def solve_max_initial_mass(
         pykep or pygmo is not installed.
     """
     segments = _segments(n_segments, guess)
+    if method == CAREFUL and guess is None:
+        return _carefully_solved(legs, segments, mu)
     legs = _as_about_the_sun(legs, mu)
     if method == BOTH:
         fast: LegSolutions = _solver(_MAXIMUM_MASS, "fast")(legs, n_segments=segments)
@@ -129,6 +145,7 @@ def optimise(
     guess: LegSolutions | None = None,
     n_segments: int | None = None,
     mu: float = MU_SUN,
+    mass_tolerance: float = MASS_ROUNDING,
 ) -> LegSolutions:
     """Find the minimum-propellant solution of each leg at its own initial mass.
 
@@ -144,6 +161,9 @@ def optimise(
         Segments of each leg; those of `guess` if that is given, otherwise 20.
     mu : float, m3/s2
         Gravitational parameter.
+    mass_tolerance : float
+        A leg whose initial mass exceeds m* by at most this share is solved at m*, which is then
+        its solution's `m0`: for masses and dates that were rounded.
 
     Returns
     -------
@@ -160,6 +180,14 @@ def optimise(
         pykep or pygmo is not installed.
     """
     segments = _segments(n_segments, guess)
+    if not 0.0 <= mass_tolerance < 1.0:
+        raise InputError(f"mass_tolerance: {mass_tolerance}, expected 0 or more and below 1")
+    if mass_tolerance > MASS_ROUNDING:
+        if guess is None:
+            guess = solve_max_initial_mass(legs, method=method, n_segments=segments, mu=mu)
+        legs = _not_above(legs, guess, mass_tolerance)
+    if method == CAREFUL:
+        return _carefully_optimised(legs, guess, segments, mu)
     legs = _as_about_the_sun(legs, mu)
     if method == BOTH:
         if guess is None:
@@ -170,6 +198,62 @@ def optimise(
     solver = _solver(_MINIMUM_PROPELLANT, method)
     solutions: LegSolutions = solver(legs, guess=guess, n_segments=segments)
     return solutions
+
+
+def _carefully_solved(legs: Legs, n_segments: int, mu: float) -> LegSolutions:
+    """Find m* by the fast solver, and by the reference where that may be wrong."""
+    found = solve_max_initial_mass(legs, n_segments=n_segments, mu=mu)
+    rows = np.flatnonzero(~found.converged | _eccentric(legs, mu))
+    if not len(rows):
+        return found
+    some = found.take(rows)
+    again = solve_max_initial_mass(legs.take(rows), method="reference", guess=some, mu=mu)
+    return _replaced(found, rows, again)
+
+
+def _carefully_optimised(
+    legs: Legs, guess: LegSolutions | None, n_segments: int, mu: float
+) -> LegSolutions:
+    """Find least propellant by the fast solver, and by the reference where that may be wrong."""
+    if guess is None:
+        guess = _carefully_solved(legs, n_segments, mu)
+    found = optimise(legs, guess=guess, mu=mu)
+    doubtful = (found.status == Status.NOT_CONVERGED) | _eccentric(legs, mu)
+    rows = np.flatnonzero(guess.converged & doubtful & (found.status != Status.TOO_HEAVY))
+    if not len(rows):
+        return found
+    some = found.take(rows)
+    again = optimise(legs.take(rows), method="reference", guess=guess.take(rows), mu=mu)
+    return _replaced(found, rows, _better(some, again, some.m_final, again.m_final))
+
+
+def _replaced(
+    solutions: LegSolutions, rows: NDArray[np.intp], better: LegSolutions
+) -> LegSolutions:
+    """Return the solutions with some rows replaced."""
+    place = np.arange(len(solutions))
+    place[rows] = len(solutions) + np.arange(len(rows))
+    return LegSolutions.concatenate([solutions, better]).take(place)
+
+
+def _eccentric(legs: Legs, mu: float) -> NDArray[np.bool_]:
+    """Return (n,) whether either orbit is very eccentric, or none of an ellipse at all."""
+    most = np.zeros(len(legs))
+    for states in (legs.rv_dep, legs.rv_arr):
+        r, v = states[:, :3], states[:, 3:]
+        radius = np.linalg.norm(r, axis=1, keepdims=True)
+        vector = np.cross(v, np.cross(r, v)) / mu - r / radius
+        most = np.maximum(most, np.linalg.norm(vector, axis=1))
+    return np.asarray(most > _ECCENTRIC)
+
+
+def _not_above(legs: Legs, guess: LegSolutions, tolerance: float) -> Legs:
+    """Return the legs with masses slightly above m* lowered to it."""
+    if len(guess) != len(legs):
+        raise InputError(f"guess: {len(guess)} rows, expected {len(legs)} as there are legs")
+    m_star = guess.m0
+    above = guess.converged & (legs.m0 > m_star) & (legs.m0 <= m_star * (1.0 + tolerance))
+    return legs.with_m0(np.where(above & (m_star >= legs.m_dry), m_star, legs.m0))
 
 
 def _segments(n_segments: int | None, guess: LegSolutions | None) -> int:
@@ -224,7 +308,7 @@ def _better(
 
 def _solver(table: dict[str, str], method: str) -> Callable[..., Any]:
     if method not in table:
-        known = ", ".join(repr(name) for name in (*table, BOTH))
+        known = ", ".join(repr(name) for name in METHODS)
         raise InputError(f"method: {method!r} is unknown, expected one of {known}")
     # Imported on use: a solver may need pygmo or compiled kernels, the others do not.
     module, _, name = table[method].partition(":")

@@ -74,7 +74,8 @@ def dense_starts(
     the departure window (stratified, so that passes with other seeds see other
     epochs). At each, every allowed body's distance to its eighth nearest
     neighbour in the orbital metric is found; the pairs with the smallest win,
-    each body at most once. `window` replaces the problem's earliest and latest start epoch.
+    each body at most once, or where it is alone as often as there are epochs. `window` replaces
+    the problem's earliest and latest start epoch.
 
     Returns
     -------
@@ -192,8 +193,13 @@ def _crowded(
 
 
 def _best_of_each_body(rows: _Rows, cost: _Array, count: int) -> _Rows:
-    """Return the positions of the pairs with the least cost, one of each body, best first."""
+    """Return the positions of the pairs with the least cost, one of each body, best first.
+
+    A body that is alone may be there as often as it is among the pairs.
+    """
     order = np.argsort(cost, kind="stable")
+    if len(rows) and (rows == rows[0]).all():
+        return order[:count]
     _, first = np.unique(rows[order], return_index=True)
     chosen: _Rows = order[np.sort(first)[:count]]
     return chosen

@@ -14,6 +14,8 @@ from feasibility.sims_flanagan.fast.compilation import prefer_fast_compilation
 from seqsearch.commands import (
     bodies,
     export,
+    fetch,
+    fly,
     plot,
     polish,
     problems,
@@ -33,6 +35,7 @@ pruner drops those that cannot be flown, and the rest are optimised in the
 Sims-Flanagan model.
 
   seqsearch run demo                      a synthetic belt; needs no file
+  seqsearch fly 3673 2764 --problem demo  a sequence of your own
   seqsearch problems                      what else there is
   seqsearch resume runs/demo              go on after an interruption
   seqsearch polish runs/demo              improve its tour
@@ -41,10 +44,12 @@ Sims-Flanagan model.
   seqsearch report runs/demo              look at it in a browser
   seqsearch export runs/demo --to csv --out tour.csv
   seqsearch bodies MPCORB.DAT             what is in an asteroid table
+  seqsearch fetch mpcorb                  bodies from those who publish them
 """
 
 _COMMANDS: Final = (
     run,
+    fly,
     resume,
     polish,
     refine,
@@ -54,6 +59,7 @@ _COMMANDS: Final = (
     export,
     problems,
     bodies,
+    fetch,
 )
 
 

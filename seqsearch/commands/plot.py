@@ -35,7 +35,7 @@ def add_parser(commands: "Commands") -> None:
 
 
 def _plot(options: argparse.Namespace) -> int:
-    from seqsearch.tours.plots import plot_tour
+    from seqsearch.tours.pictures.plots import plot_tour
     from seqsearch.tours.tour_files import read_tour
 
     source = sequence_path(options.path)

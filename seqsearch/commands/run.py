@@ -51,11 +51,16 @@ def add_parser(commands: "Commands") -> None:
         help="such as lambert:1.3,mima2:0.97; default:RECALL or FILE.seqmodel:RECALL for a "
         "trained model; none keeps all",
     )
-    run.add_argument("--solver", choices=("fast", "reference"), help="leg solver")
+    run.add_argument("--solver", choices=("fast", "reference", "best", "auto"), help="leg solver")
     run.add_argument(
         "--polish",
         metavar="T",
         help="then polish the best tours for 90s, 5min (see polish)",
+    )
+    run.add_argument(
+        "--refine",
+        action="store_true",
+        help="then refine the best tour to continuous thrust (see refine)",
     )
     add_output(run)
     run.set_defaults(run=_run)
@@ -81,6 +86,7 @@ def _run(options: argparse.Namespace) -> int:
             "solver": options.solver,
         },
         polish_s=seconds(options.polish, "--polish"),
+        refine=options.refine,
     )
     return print_result(options, folder, code)
 
@@ -95,11 +101,13 @@ def run_search(
     overrides: dict[str, Any],
     polish_s: float | None = None,
     select: str | None = None,
+    refine: bool = False,
 ) -> tuple[int, Path]:
     """Run a search as the command line asks for it and return exit code and run folder.
 
     With `polish_s`, the best tours are polished for that many seconds afterwards.
-    A fleet polishes each probe within the time limit instead.
+    A fleet polishes each probe within the time limit instead. With `refine`, the best tour is
+    refined to continuous thrust at the end, unless the run was interrupted.
 
     Everything is read and checked before the run folder is made.
 
@@ -117,7 +125,9 @@ def run_search(
     )
     from seqsearch.runs.begin import begin_search
     from seqsearch.runs.fleet_run import run_fleet
+    from seqsearch.runs.flying import fly_run
     from seqsearch.runs.polishing import polish_run
+    from seqsearch.runs.refining import refine_run
 
     if seed < 0:
         raise InputError(f"--seed {seed}: expected zero or more")
@@ -130,16 +140,20 @@ def run_search(
         # The run folder's copy is read from elsewhere when the run is resumed.
         config = with_catalogue(config, str(Path(config.catalogue.file).absolute()))
     folder = out or Path("runs") / config.problem.name
-    if config.fleet.probes > 1:
+    if config.mission.sequence:
+        code = fly_run(config, folder, seed, limits)
+    elif config.fleet.probes > 1:
         code = run_fleet(config, folder, seed=seed, limits=limits, search_probe=begin_search)
-        return code, folder
-    code = begin_search(config, folder, seed, limits)
-    if code == 0 and polish_s is not None:
-        code = polish_run(
-            folder,
-            time_limit_s=polish_s,
-            seed=seed,
-            workers=limits.workers,
-            scheduler=limits.scheduler,
-        )
+    else:
+        code = begin_search(config, folder, seed, limits)
+        if code == 0 and polish_s is not None:
+            code = polish_run(
+                folder,
+                time_limit_s=polish_s,
+                seed=seed,
+                workers=limits.workers,
+                scheduler=limits.scheduler,
+            )
+    if code == 0 and refine:
+        refine_run(folder)
     return code, folder

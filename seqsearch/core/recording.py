@@ -3,13 +3,14 @@
 from typing import Final
 
 import numpy as np
+from msgspec import UNSET, UnsetType
 from numpy.typing import NDArray
 
-from feasibility.constants import DAY_S
 from feasibility.orbits import Catalogue
+from feasibility.sims_flanagan.mass_convention import segment_masses, throttles_to_impulses
 from seqsearch.core.problem import Problem
 from seqsearch.core.tree import FlownLeg, SearchTree
-from seqsearch.tours.records import Impulse, TourBody, TourLeg
+from seqsearch.tours.records import Impulse, State, TourBody, TourLeg
 from seqsearch.tours.tour import Tour
 
 _REST_M_S: Final = 1e-6
@@ -72,7 +73,17 @@ def _leg(problem: Problem, leg: FlownLeg) -> TourLeg:
         dep_velocity_m_s=_relative(problem, leg.dep_row, leg.t_dep_mjd2000, leg.rv_dep),
         arr_velocity_m_s=_relative(problem, leg.arr_row, leg.t_arr_mjd2000, leg.rv_arr),
         dropped_kg=leg.dropped,
+        dep_body_state=_told(problem.catalogue, leg.dep_row, leg.t_dep_mjd2000),
+        arr_body_state=_told(problem.catalogue, leg.arr_row, leg.t_arr_mjd2000),
     )
+
+
+def _told(catalogue: Catalogue, row: int, t_mjd2000: float) -> State | UnsetType:
+    """Return where a body is, if that does not follow from its elements."""
+    if catalogue.ephemeris is None:
+        return UNSET
+    x, y, z, vx, vy, vz = (float(value) for value in catalogue.states_at([row], t_mjd2000)[0])
+    return (x, y, z, vx, vy, vz)
 
 
 def _relative(
@@ -86,32 +97,18 @@ def _relative(
 
 
 def _impulses(problem: Problem, leg: FlownLeg) -> tuple[Impulse, ...]:
-    """Turn throttles into impulses in pykep's mass convention.
-
-    An impulse is thrust x segment time x throttle / mass, with the mass before
-    the impulse in the first half of the leg and the mass after it in the
-    second half (pykep's ``leg.sims_flanagan``, cut 0.5). Masses follow the
-    rocket equation forward from the initial mass and backward from the final
-    mass; the two meet at the match point within the mass mismatch.
-    """
+    """Turn throttles into impulses, by the mass convention of the solvers."""
     n = len(leg.throttles)
-    forward = n // 2
-    exhaust = problem.spacecraft.exhaust_velocity
-    push = problem.spacecraft.thrust * leg.tof_days / n * DAY_S
-    norms = np.linalg.norm(leg.throttles, axis=1)
-    before, after = np.empty(n), np.empty(n)
-    mass = leg.m0
-    for k in range(forward):
-        before[k] = mass
-        mass *= float(np.exp(-push * norms[k] / mass / exhaust))
-        after[k] = mass
-    mass = leg.m_final
-    for k in range(n - 1, forward - 1, -1):
-        after[k] = mass
-        mass *= float(np.exp(push * norms[k] / mass / exhaust))
-        before[k] = mass
-    reference = np.where(np.arange(n) < forward, before, after)
-    dv = leg.throttles * (push / reference)[:, None]
+    flown = (
+        leg.throttles[None],
+        np.array([leg.m0]),
+        np.array([leg.m_final]),
+        np.array([problem.spacecraft.thrust]),
+        np.array([problem.spacecraft.exhaust_velocity]),
+        np.array([leg.tof_days]),
+    )
+    dv = throttles_to_impulses(*flown)[0]
+    before, after = (masses[0] for masses in segment_masses(*flown))
     centres = leg.t_dep_mjd2000 + (np.arange(n) + 0.5) * leg.tof_days / n
     return tuple(
         Impulse(

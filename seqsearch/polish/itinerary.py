@@ -80,6 +80,14 @@ class Itinerary:
             m_dry=0.0,
         )
 
+    def appended(self, row: int, t_dep_mjd2000: float, tof_days: float) -> Self:
+        """Return the itinerary with one more leg, to the body of a catalogue row."""
+        return type(self)(
+            np.append(self.rows, row),
+            np.append(self.t_dep_mjd2000, t_dep_mjd2000),
+            np.append(self.tof_days, tof_days),
+        )
+
     def part(self, first: int, last: int) -> Self:
         """Return the bodies from one position to another, both included, and their legs."""
         return type(self)(

@@ -3,7 +3,7 @@
 import re
 from functools import cache
 from pathlib import Path
-from typing import Annotated, Any, Final, final
+from typing import Annotated, Any, Final, Literal, final
 
 import msgspec
 import numpy as np
@@ -14,6 +14,7 @@ from feasibility import InputError, Spacecraft
 from feasibility.constants import mjd_to_mjd2000
 from feasibility.orbits import Catalogue, read_catalogue, synthetic_main_belt
 from feasibility.orbits.selection import selected_rows
+from feasibility.orbits.spk.files import is_kernel
 from feasibility.runtime.toml_file import convert_table, parse_toml, read_toml_text
 from seqsearch.core.problem import Problem
 from seqsearch.problems.registry import ProblemPlugin, builtin_problems, plugins
@@ -68,12 +69,16 @@ class SpacecraftTable(_Table, frozen=True, kw_only=True):
 
 @final
 class MissionTable(_Table, frozen=True, kw_only=True):
-    """Table ``[mission]``; epochs in MJD, or as dates such as ``2030-01-01``."""
+    """Table ``[mission]``; epochs in MJD, or as dates such as ``2030-01-01``.
+
+    With a `sequence` these bodies alone are visited, in this order.
+    """
 
     first_departure_mjd: tuple[float, float]
     max_duration_days: float
     min_stay_days: float = 0.0
     start_ids: tuple[int, ...] = ()
+    sequence: tuple[int, ...] = ()
 
 
 @final
@@ -81,7 +86,9 @@ class CatalogueTable(_Table, frozen=True, kw_only=True):
     """Table ``[catalogue]``: a file, or a synthetic belt, or neither (then --catalogue).
 
     Of its bodies those are searched that `select` describes, less `exclude_ids`. `units` are those
-    of columns whose header does not tell them.
+    of columns whose header does not tell them. Where the file is an SPK kernel, a folder of them
+    or a meta-kernel, `bodies` says which of its bodies are meant (default: all small bodies and
+    spacecraft), and `ephemeris` whether they move on Kepler orbits or as the kernels say.
     """
 
     file: str | None = None
@@ -90,6 +97,8 @@ class CatalogueTable(_Table, frozen=True, kw_only=True):
     synthetic_bodies: Annotated[int, Meta(ge=2)] | None = None
     synthetic_seed: Annotated[int, Meta(ge=0)] = 0
     exclude_ids: tuple[int, ...] = ()
+    bodies: tuple[int | str, ...] = ()
+    ephemeris: Literal["kepler", "spk"] = "kepler"
 
 
 @final
@@ -235,6 +244,12 @@ def with_selection(config: Config, select: str) -> Config:
     return msgspec.structs.replace(config, catalogue=table)
 
 
+def with_sequence(config: Config, sequence: tuple[int, ...]) -> Config:
+    """Return the configuration with a sequence of bodies to visit in this order."""
+    mission = msgspec.structs.replace(config.mission, sequence=sequence)
+    return msgspec.structs.replace(config, mission=mission)
+
+
 def build_problem(config: Config, catalogue: Catalogue | None = None) -> Problem:
     """Load the catalogue and build the validated problem.
 
@@ -256,15 +271,20 @@ def build_problem(config: Config, catalogue: Catalogue | None = None) -> Problem
     craft = config.spacecraft
     mission = config.mission
     earliest, latest = mission.first_departure_mjd
+    bodies = _without_excluded(catalogue or whole_catalogue(config), config)
+    if mission.sequence:
+        # The others play no part, and most of the work would be to look at them.
+        bodies = bodies.select(np.unique(bodies.rows_of(np.asarray(mission.sequence))))
     base = RendezvousProblem(
         name=config.problem.name,
-        catalogue=_without_excluded(catalogue or _whole_catalogue(config), config),
+        catalogue=bodies,
         spacecraft=Spacecraft(craft.dry_mass_kg, craft.thrust_n, craft.isp_s),
         m0=craft.wet_mass_kg,
         first_departure_mjd2000=(mjd_to_mjd2000(earliest), mjd_to_mjd2000(latest)),
         max_duration_days=mission.max_duration_days,
         min_stay_days=mission.min_stay_days,
         start_ids=_start_ids(config),
+        sequence=mission.sequence,
     )
     own = [
         (plugin, rules) for plugin in plugins().values() if (rules := _rules_of(config, plugin))
@@ -274,9 +294,20 @@ def build_problem(config: Config, catalogue: Catalogue | None = None) -> Problem
             f"problem {config.problem.name}: tables [{own[0][0].name}] and [{own[1][0].name}], "
             "expected the rules of one problem"
         )
+    if own and mission.sequence:
+        raise InputError(
+            f"problem {config.problem.name}: a sequence and a table [{own[0][0].name}], expected "
+            "a sequence only in tours of rendezvous alone"
+        )
     for plugin, rules in own:
         if plugin.build is not None:
-            return plugin.build(base, rules)
+            problem = plugin.build(base, rules)
+            if base.catalogue.ephemeris is not None and problem.catalogue.ephemeris is None:
+                raise InputError(
+                    f"problem {base.name}: [{plugin.name}] has bodies of its own on Kepler "
+                    'orbits; expected [catalogue] ephemeris = "kepler"'
+                )
+            return problem
     return base
 
 
@@ -324,8 +355,8 @@ def table_at_hand(config: Config) -> Catalogue | None:
         It is there, but cannot be read.
     """
     file = config.catalogue.file
-    there = config.catalogue.synthetic_bodies if file is None else Path(file).is_file()
-    return _whole_catalogue(config) if there else None
+    there = config.catalogue.synthetic_bodies if file is None else Path(file).exists()
+    return whole_catalogue(config) if there else None
 
 
 def _without_excluded(catalogue: Catalogue, config: Config) -> Catalogue:
@@ -334,12 +365,27 @@ def _without_excluded(catalogue: Catalogue, config: Config) -> Catalogue:
     return catalogue.select(kept) if len(excluded) else catalogue
 
 
-def _whole_catalogue(config: Config) -> Catalogue:
+def whole_catalogue(config: Config) -> Catalogue:
+    """Return the catalogue that a configuration names, with the bodies that it excludes.
+
+    Raises
+    ------
+    InputError
+        There is none, or it cannot be read.
+    """
     table = config.catalogue
     if table.file is not None and table.synthetic_bodies is not None:
         raise InputError(
             f"problem {config.problem.name}: [catalogue] has both file and synthetic_bodies, "
             "expected one of them"
+        )
+    if table.file is not None and is_kernel(Path(table.file)):
+        return _kernel_bodies(config, Path(table.file))
+    if table.bodies or table.ephemeris == "spk":
+        key = "bodies" if table.bodies else 'ephemeris = "spk"'
+        raise InputError(
+            f"problem {config.problem.name}: [catalogue] has {key}, expected file to be an SPK "
+            f"kernel, a folder of them or a meta-kernel, got {table.file or 'none'}"
         )
     if table.file is not None:
         return read_catalogue(Path(table.file), units=table.units, select=table.select)
@@ -351,6 +397,23 @@ def _whole_catalogue(config: Config) -> Catalogue:
         f"problem {config.problem.name}: no asteroid table; give one with --catalogue FILE "
         "(the README says where the official tables are)"
     )
+
+
+def _kernel_bodies(config: Config, path: Path) -> Catalogue:
+    # Imported here: other problems have no need of SPICE.
+    from feasibility.orbits.spk.reading import read_kernels
+
+    earliest, latest = (mjd_to_mjd2000(epoch) for epoch in config.mission.first_departure_mjd)
+    table = config.catalogue
+    if table.units:
+        raise InputError(f"{path}: units are given, but SPK kernels have their own; expected none")
+    found = read_kernels(
+        path,
+        table.bodies,
+        table.ephemeris,
+        (earliest, latest + config.mission.max_duration_days),
+    )
+    return found if table.select is None else selected_rows(found, table.select)
 
 
 def to_toml(config: Config) -> str:

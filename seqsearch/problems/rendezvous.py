@@ -1,10 +1,12 @@
 """`RendezvousProblem`: everything that defines a tour of rendezvous, not how to find one."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Final, final
 
 import numpy as np
+from msgspec import UNSET, UnsetType
 from numpy.typing import NDArray
 
 from feasibility import InputError, Legs, Spacecraft
@@ -16,6 +18,7 @@ from seqsearch.core.mission import days_until_end, not_visited, used_up
 from seqsearch.core.nodes import Nodes
 from seqsearch.core.tree import FlownLeg
 from seqsearch.settings import SearchSettings
+from seqsearch.tours.records import KernelFile
 from seqsearch.tours.tour import TourRules
 
 _MAX_ACCELERATION: Final = 0.01
@@ -48,12 +51,15 @@ class RendezvousProblem:
         Shortest time between an arrival and the next departure.
     start_ids : tuple of int, optional
         Ids of the bodies at which a tour may start; empty for any.
+    sequence : tuple of int, optional
+        Ids of the bodies that are to be visited, in this order; empty for any.
 
     Raises
     ------
     InputError
         A value is not finite or out of range, the wet mass is below the dry
-        mass, the catalogue is empty, or a start id is not in it.
+        mass, the catalogue is empty, or a start id or an id of the sequence is not in it; the
+        sequence has one body alone, or one twice.
     """
 
     name: str
@@ -64,6 +70,7 @@ class RendezvousProblem:
     max_duration_days: float
     min_stay_days: float
     start_ids: tuple[int, ...] = ()
+    sequence: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
         numbers = {
@@ -107,6 +114,7 @@ class RendezvousProblem:
                 f"problem {self.name}: min_stay_days = {self.min_stay_days:g}, "
                 "expected zero or more"
             )
+        self._check_sequence()
         if len(self.catalogue) < 2:
             raise InputError(
                 f"problem {self.name}: the catalogue {self.catalogue.source} holds "
@@ -122,6 +130,8 @@ class RendezvousProblem:
         InputError
             A start id is not in the catalogue.
         """
+        if self.sequence:
+            return self._sequence_rows[:1]
         if not self.start_ids:
             return np.arange(len(self.catalogue))
         return np.asarray(self.catalogue.rows_of(np.asarray(self.start_ids)), dtype=np.intp)
@@ -136,8 +146,16 @@ class RendezvousProblem:
         return Nodes.at_start(rows, t_mjd2000, np.full(len(rows), self.m0))
 
     def may_visit(self, nodes: Nodes, target: NDArray[np.intp], /) -> NDArray[np.bool_]:
-        """Return (n, t) whether targets, catalogue rows (n, t), were not visited before."""
-        return not_visited(nodes, target)
+        """Return (n, t) whether targets, catalogue rows (n, t), were not visited before.
+
+        Where there is a sequence: whether they are next in it.
+        """
+        if not self.sequence:
+            return not_visited(nodes, target)
+        # No row follows the last body of the sequence.
+        following = np.append(self._sequence_rows, -1)[nodes.depth + 1]
+        allowed: NDArray[np.bool_] = target == following[:, None]
+        return allowed
 
     def days_left(
         self, nodes: Nodes, t_dep_mjd2000: NDArray[np.float64], /
@@ -201,5 +219,32 @@ class RendezvousProblem:
             first_departure_mjd2000=self.first_departure_mjd2000,
             max_duration_days=self.max_duration_days,
             min_stay_days=self.min_stay_days,
-            start_ids=self.start_ids,
+            start_ids=self.sequence[:1] or self.start_ids,
+            kernels=_kernels_of(self.catalogue),
         )
+
+    @cached_property
+    def _sequence_rows(self) -> NDArray[np.intp]:
+        return np.asarray(self.catalogue.rows_of(np.asarray(self.sequence)), dtype=np.intp)
+
+    def _check_sequence(self) -> None:
+        if not self.sequence:
+            return
+        twice = [body for body in self.sequence if self.sequence.count(body) > 1]
+        if twice or len(self.sequence) < 2:
+            found = f"{twice[0]} more than once" if twice else "one body"
+            raise InputError(
+                f"problem {self.name}: sequence has {found}, expected two or more different ids"
+            )
+        if self.start_ids and self.sequence[0] not in self.start_ids:
+            raise InputError(
+                f"problem {self.name}: sequence begins at {self.sequence[0]}, "
+                f"expected one of start_ids {self.start_ids}"
+            )
+
+
+def _kernels_of(catalogue: Catalogue) -> tuple[KernelFile, ...] | UnsetType:
+    if catalogue.ephemeris is None:
+        return UNSET
+    sources = catalogue.ephemeris.sources
+    return tuple(KernelFile(name=source.name, sha256=source.sha256) for source in sources)

@@ -1,11 +1,14 @@
 """What a problem asks of a given tour, without trusting the tour's own file."""
 
+from pathlib import Path
+
 import msgspec
 import numpy as np
 
 from feasibility.orbits import Catalogue
+from feasibility.orbits.spk.files import kernel_files
 from seqsearch.problems.problem_file import Config, build_problem
-from seqsearch.tours.records import TourBody
+from seqsearch.tours.records import KernelFile, TourBody
 from seqsearch.tours.tour import Tour, TourRules
 
 
@@ -27,11 +30,30 @@ def rules_of(config: Config, tour: Tour, catalogue: Catalogue | None = None) -> 
         A value of the problem file is out of range, or its rules need the table.
     """
     if catalogue is None:
-        catalogue = _bodies_of(tour, config.mission.start_ids)
+        catalogue = _bodies_of(tour, (*config.mission.start_ids, *config.mission.sequence))
         # Which bodies were excluded plays no part in the rules.
         table = msgspec.structs.replace(config.catalogue, exclude_ids=())
         config = msgspec.structs.replace(config, catalogue=table)
-    return build_problem(config, catalogue).tour_rules()
+    rules = build_problem(config, catalogue).tour_rules()
+    if config.catalogue.ephemeris == "spk" and not rules.kernels:
+        # What the tour says of them is better than silence: the verification asks for them.
+        named = KernelFile(name=Path(config.catalogue.file or "a kernel").name, sha256="unknown")
+        rules = msgspec.structs.replace(rules, kernels=tour.rules.kernels or (named,))
+    return rules
+
+
+def kernels_at_hand(config: Config) -> tuple[Path, ...]:
+    """Return the SPK kernels from which a configuration's bodies move; none where none do.
+
+    Raises
+    ------
+    InputError
+        They are there, but cannot be used.
+    """
+    path = Path(config.catalogue.file or "")
+    if config.catalogue.ephemeris != "spk" or not path.exists():
+        return ()
+    return kernel_files(path).spk
 
 
 def differences(found: TourRules, expected: TourRules) -> list[str]:
@@ -49,11 +71,11 @@ def _short(value: object) -> str:
     return text if len(text) <= 60 else text[:57] + "..."
 
 
-def _bodies_of(tour: Tour, start_ids: tuple[int, ...]) -> Catalogue:
-    """Return the visited bodies as a catalogue; the first stands in for missing start bodies."""
+def _bodies_of(tour: Tour, named: tuple[int, ...]) -> Catalogue:
+    """Return the visited bodies as a catalogue; the first stands in for others that are named."""
     bodies = {body.id: body for body in tour.visits or tour.bodies}
     first = next(iter(bodies.values()))
-    for body_id in (*start_ids, max(bodies) + 1):
+    for body_id in (*named, max(bodies) + 1):
         bodies.setdefault(body_id, first)
     return Catalogue(
         ids=list(bodies),

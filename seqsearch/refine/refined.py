@@ -1,9 +1,11 @@
 """`RefinedTour`: the rows of a tour with continuous thrust, and what changed by it."""
 
 from dataclasses import asdict, dataclass
-from typing import Any, final
+from typing import Any, Final, final
 
 from seqsearch.tours.trajectory import Trajectory
+
+_LATE_DAYS: Final = 1e-6
 
 
 @final
@@ -93,12 +95,12 @@ class RefinedTour:
         """Return propellant, times and accuracy in a line."""
         late = self.legs[-1].arrival_delay_days
         miss_m = 1e3 * max(leg.miss_km for leg in self.legs)
+        when = f"{late:.2f} days late" if late > _LATE_DAYS else "on time"
         return (
-            f"{len(self.legs)} legs with continuous thrust: "
-            f"propellant {self.propellant_kg:.2f} kg ({self.difference_percent:+.2f} % of the impulses' "
+            f"{len(self.legs)} legs with continuous thrust: propellant "
+            f"{self.propellant_kg:.2f} kg ({self.difference_percent:+.2f} % of the impulses' "
             f"{self.impulsive_propellant_kg:.2f} kg), final mass {self.m_final_kg:.2f} kg, "
-            f"{f'{late:.2f} days late' if late > 1e-6 else 'on time'}, "
-            f"closed to {miss_m:.1f} m"
+            f"{when}, closed to {miss_m:.1f} m"
         )
 
     def summary(self) -> dict[str, Any]:

@@ -8,14 +8,13 @@ from typing import Final, final
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.constants import DAY_S
 from feasibility.continuous import TIME_PRICE, ContinuousArc, ContinuousLeg, refine_leg
 from feasibility.errors import InputError
-from feasibility.orbits import classical_to_cartesian
 from seqsearch.refine.refined import RefinedLeg, RefinedTour
 from seqsearch.refine.timetable import Timetable
+from seqsearch.tours.bodies.told_motion import motion_of
 from seqsearch.tours.labels import body_label
-from seqsearch.tours.records import TourBody, TourLeg, Vector
+from seqsearch.tours.records import TourLeg, Vector
 from seqsearch.tours.tour import Tour
 from seqsearch.tours.trajectory import Phase, Trajectory
 
@@ -85,7 +84,7 @@ def refine_tour(
         raise InputError("the tour has no leg, so there is nothing to refine")
     if time_price is not None and not 0.0 < time_price < np.inf:
         raise InputError(f"time price {time_price:g}, expected more than 0")
-    attempts = _ATTEMPTS
+    attempts: tuple[_Attempt, ...] = _ATTEMPTS
     if time_price is not None:
         attempts = (_Attempt(time_price, catch_up=False), _Attempt(time_price, catch_up=True))
     failures = []
@@ -150,10 +149,10 @@ def _arc(
     leg, rules = tour.legs[k], tour.rules
     t_dep = table.departure(k, arrived)
     if passed is None:
-        departure = _state(tour.body(leg.from_id), rules.mu_m3_s2, leg.dep_velocity_m_s, t_dep)
+        departure = _state(tour, leg.from_id, leg.dep_velocity_m_s, t_dep)
     else:
         departure = passed.states[-1]
-    target = partial(_state, tour.body(leg.to_id), rules.mu_m3_s2, leg.arr_velocity_m_s)
+    target = partial(_state, tour, leg.to_id, leg.arr_velocity_m_s)
     planned = table.arrivals[k]
     late = t_dep - table.departures[k]
     arrival = planned + late if late > _LATE_DAYS else planned
@@ -176,12 +175,9 @@ def _arc(
     )
 
 
-def _state(body: TourBody, mu: float, relative: Vector, t_mjd2000: float) -> NDArray[np.float64]:
+def _state(tour: Tour, body_id: int, relative: Vector, t_mjd2000: float) -> NDArray[np.float64]:
     """Return the (6,) state of a body, with a velocity relative to it added."""
-    motion = np.sqrt(mu / body.a_m**3)
-    anomaly = body.mean_anomaly_rad + motion * (t_mjd2000 - body.epoch_mjd2000) * DAY_S
-    angles = [body.i_rad, body.node_rad, body.argp_rad, np.remainder(anomaly, 2 * np.pi)]
-    state = classical_to_cartesian([body.a_m, body.e, *angles], mu)
+    state: NDArray[np.float64] = motion_of(tour, tour.body(body_id), [t_mjd2000])[0]
     state[3:] += relative
     return state
 

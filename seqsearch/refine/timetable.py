@@ -37,7 +37,9 @@ class Timetable:
     departures, arrivals : tuple of float
         As the tour has them, in epochs that files can hold.
     stays : tuple of float
-        Shortest time from each arrival to the next departure; 0 after a fly-by.
+        Shortest time from each arrival to the next departure.
+    fly_bys : tuple of bool
+        Whether each leg but the last ends with a fly-by, after which there is no stay.
     latest : float
         Latest end of the tour.
     """
@@ -45,12 +47,14 @@ class Timetable:
     departures: tuple[float, ...]
     arrivals: tuple[float, ...]
     stays: tuple[float, ...]
+    fly_bys: tuple[bool, ...]
     latest: float
 
     @classmethod
     def of(cls, tour: Tour) -> "Timetable":
         """Return the timetable of a tour."""
         legs, rules = tour.legs, tour.rules
+        fly_bys = tuple(leg.is_fly_by for leg in legs[:-1])
         stays = tuple(0.0 if leg.is_fly_by else rules.min_stay_days for leg in legs[:-1])
         departures = [float(file_epoch(legs[0].t_dep_mjd2000))]
         for (leg, following), stay in zip(pairwise(legs), stays, strict=True):
@@ -58,7 +62,8 @@ class Timetable:
             departures.append(_departure(following.t_dep_mjd2000, arrival, stay))
         latest = not_after(departures[0] + max(rules.max_duration_days, tour.duration_days))
         arrivals = [float(file_epoch(leg.t_arr_mjd2000)) for leg in legs]
-        return cls(tuple(departures), (*arrivals[:-1], min(arrivals[-1], latest)), stays, latest)
+        arrivals[-1] = min(arrivals[-1], latest)
+        return cls(tuple(departures), tuple(arrivals), stays, fly_bys, latest)
 
     def departure(self, k: int, arrival_before: float | None) -> float:
         """Return when leg k departs after the one before it has arrived.
@@ -67,7 +72,7 @@ class Timetable:
         """
         if arrival_before is None:
             return self.departures[k]
-        if self.stays[k - 1] == 0.0 and self.departures[k] <= self.arrivals[k - 1]:
+        if self.fly_bys[k - 1]:
             return arrival_before
         return _departure(self.departures[k], arrival_before, self.stays[k - 1])
 

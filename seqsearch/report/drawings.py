@@ -7,10 +7,11 @@ from numpy.typing import NDArray
 
 from feasibility.constants import AU
 from seqsearch.report.material import Material
+from seqsearch.tours.bodies.told_motion import motion_of
 from seqsearch.tours.dates import date_of
 from seqsearch.tours.export.protocol import Flight
-from seqsearch.tours.paths import body_states, orbit_points
-from seqsearch.tours.stops import stops
+from seqsearch.tours.paths import orbit_points
+from seqsearch.tours.pictures.stops import stops
 from seqsearch.tours.tour import Tour
 from seqsearch.tours.trajectory import Phase
 
@@ -68,7 +69,7 @@ def _stops(tour: Tour) -> list[dict[str, Any]]:
     """Return where the tour starts and arrives, numbered as the legs."""
     found = []
     for stop in stops(tour):
-        at = body_states(stop.body, [stop.t_mjd2000], tour.rules.mu_m3_s2)[0, :3]
+        at = motion_of(tour, stop.body, [stop.t_mjd2000])[0, :3]
         found.append(
             {
                 "number": stop.number,
@@ -85,10 +86,10 @@ def _stays(tour: Tour) -> list[list[list[float]]]:
     """Return the way of the bodies while the spacecraft is there."""
     return [
         _points(
-            body_states(
+            motion_of(
+                tour,
                 stop.body,
                 np.linspace(stop.t_mjd2000, stop.t_mjd2000 + stop.stay_days, _POINTS_A_STAY),
-                tour.rules.mu_m3_s2,
             )[:, :3]
         )
         for stop in stops(tour)

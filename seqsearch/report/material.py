@@ -11,7 +11,7 @@ from typing import Any, Final, final
 from feasibility.errors import InputError
 from seqsearch.runs.flights import flight_of, tour_file
 from seqsearch.runs.run_folder import AUDIT, CANDIDATES, CONFIG, COUNTERS, PROVENANCE
-from seqsearch.tours.as_flown import as_flown
+from seqsearch.tours.export.as_flown import as_flown
 from seqsearch.tours.export.protocol import Flight
 from seqsearch.tours.paths import impulsive_trajectory
 from seqsearch.tours.tour import Tour

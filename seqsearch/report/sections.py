@@ -8,7 +8,7 @@ from typing import Any, Final
 from feasibility.constants import MJD2000_MJD
 from seqsearch.report.material import Material
 from seqsearch.tours.dates import date_of
-from seqsearch.tours.stops import stops
+from seqsearch.tours.pictures.stops import stops
 from seqsearch.tours.tour import Tour
 
 _LONGEST: Final = 60_000

@@ -7,6 +7,7 @@ import numpy as np
 
 from feasibility import AllOf
 from feasibility.constants import YEAR_DAYS
+from feasibility.orbits.spk.kepler_error import motion_line
 from feasibility.runtime.cluster import ClusterExecutor, crew
 from feasibility.runtime.locks import folder_lock
 from feasibility.runtime.terminal import Level, say
@@ -73,6 +74,8 @@ def _begun(
             Level.PROGRESS,
         )
         say(_window_line(problem), Level.PROGRESS)
+        if motion := motion_line(problem.catalogue):
+            say(motion, Level.PROGRESS)
         return run_session(
             folder,
             checkpoints,

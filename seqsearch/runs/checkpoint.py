@@ -231,10 +231,12 @@ class Checkpoints:
 
 
 def catalogue_digest(catalogue: Catalogue) -> str:
-    """Return the SHA-256 of ids, epochs and elements of an asteroid table."""
+    """Return the SHA-256 of ids, epochs and elements of a catalogue, and of how it moves."""
     digest = hashlib.sha256()
     for column in (catalogue.ids, catalogue.epoch_mjd2000, catalogue.elements):
         digest.update(np.ascontiguousarray(column).tobytes())
+    if catalogue.ephemeris is not None:
+        digest.update(catalogue.ephemeris.digest.encode())
     return digest.hexdigest()
 
 

@@ -17,13 +17,13 @@ from feasibility.runtime.provenance import provenance
 from feasibility.runtime.terminal import Level, say
 from feasibility.runtime.workers import default_workers
 from seqsearch.core.problem import Problem
-from seqsearch.polish import PolishResult, PolishStep, distinct_tours, polish
+from seqsearch.polish import PolishResult, PolishSettings, PolishStep, distinct_tours, polish
 from seqsearch.problems.problem_file import build_problem, read_config, with_catalogue
 from seqsearch.pruning.pruner_spec import parse_pruner, predictor_of
 from seqsearch.runs.checkpoint import FOLDER, Checkpoints, catalogue_digest
 from seqsearch.runs.run_folder import CONFIG, SEQUENCE, RunFolder, worth
 from seqsearch.runs.session import PACKAGES
-from seqsearch.tours.plots import plot_tour
+from seqsearch.tours.pictures.plots import plot_tour
 from seqsearch.tours.tour import Tour
 from seqsearch.tours.tour_files import read_tour
 
@@ -124,7 +124,9 @@ def _polished(
         predictor=predictor,
         rng=np.random.default_rng(seed),
         executor=executor,
-        time_limit_s=time_limit_s,
+        # Of a sequence that the user gave the epochs alone are free.
+        time_limit_s=None if config.mission.sequence else time_limit_s,
+        settings=PolishSettings(rounds=0) if config.mission.sequence else None,
         on_step=on_step,
     )
     _report(run, before, result, seed, time_limit_s)

@@ -27,7 +27,7 @@ from seqsearch.pruning.pruner_spec import predictor_of
 from seqsearch.runs.checkpoint import Checkpoints
 from seqsearch.runs.progress import Progress
 from seqsearch.runs.run_folder import RunFolder
-from seqsearch.tours.plots import plot_tour
+from seqsearch.tours.pictures.plots import plot_tour
 
 PACKAGES: Final = ("feasibility", "seqsearch")
 """What has to be the same on all workers of a cluster."""

@@ -17,5 +17,10 @@ def body_label(tour: Tour, body_id: int) -> str:
     """Return the id of a body as text, or a name such as ``EARTH`` for a launch planet."""
     planet = launch_planet(tour.rules)
     if planet is not None and planet.id == body_id:
-        return planet.name.upper().replace(" ", "_")
+        return planet_label(planet)
     return str(body_id)
+
+
+def planet_label(planet: TourBody) -> str:
+    """Return the name of a planet as rows have it, such as ``EARTH``."""
+    return planet.name.upper().replace(" ", "_")

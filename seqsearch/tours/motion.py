@@ -48,6 +48,20 @@ def body_state(body: TourBody, t_mjd2000: float, mu: float) -> NDArray[np.float6
     return np.concatenate([frame.apply(position), frame.apply(velocity)])
 
 
+def departure_state(leg: TourLeg, body: TourBody, mu: float) -> NDArray[np.float64]:
+    """Return the (6,) state in m and m/s of the body that a leg leaves, as the tour has it."""
+    if leg.dep_body_state:
+        return np.array(leg.dep_body_state)
+    return body_state(body, leg.t_dep_mjd2000, mu)
+
+
+def arrival_state(leg: TourLeg, body: TourBody, mu: float) -> NDArray[np.float64]:
+    """Return the (6,) state in m and m/s of the body that a leg reaches, as the tour has it."""
+    if leg.arr_body_state:
+        return np.array(leg.arr_body_state)
+    return body_state(body, leg.t_arr_mjd2000, mu)
+
+
 def fly(leg: TourLeg, departure: TourBody, mu: float) -> NDArray[np.float64]:
     """Return the (6,) state in m and m/s at the end of a leg, integrated through all impulses.
 
@@ -60,7 +74,12 @@ def fly(leg: TourLeg, departure: TourBody, mu: float) -> NDArray[np.float64]:
     mu : float
         Gravitational parameter of the Sun, m3/s2.
     """
-    state = body_state(departure, leg.t_dep_mjd2000, mu)
+    return fly_from(leg, departure_state(leg, departure, mu), mu)
+
+
+def fly_from(leg: TourLeg, departure: NDArray[np.float64], mu: float) -> NDArray[np.float64]:
+    """Return what `fly` does, from the (6,) state of the body at which the leg begins."""
+    state = departure.copy()
     state[3:] += leg.dep_velocity_m_s
     t = leg.t_dep_mjd2000
     for impulse in leg.impulses:

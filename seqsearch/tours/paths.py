@@ -9,7 +9,7 @@ from feasibility.constants import DAY_S
 from feasibility.errors import InputError
 from feasibility.orbits.classical import classical_to_cartesian, perifocal_axes
 from seqsearch.tours.labels import body_label
-from seqsearch.tours.motion import body_state
+from seqsearch.tours.motion import departure_state
 from seqsearch.tours.records import TourBody, TourLeg
 from seqsearch.tours.tour import Tour
 from seqsearch.tours.trajectory import Phase, Trajectory
@@ -108,7 +108,7 @@ def _phase(tour: Tour, leg: TourLeg, step_days: float) -> Phase:
     from feasibility.orbits.kepler_kernels import propagate_batch
 
     mu = tour.rules.mu_m3_s2
-    state = body_state(tour.body(leg.from_id), leg.t_dep_mjd2000, mu)
+    state = departure_state(leg, tour.body(leg.from_id), mu)
     state[3:] += leg.dep_velocity_m_s
     stops = [leg.t_dep_mjd2000, *(i.t_mjd2000 for i in leg.impulses), leg.t_arr_mjd2000]
     jumps = [*(np.asarray(impulse.dv_m_s) for impulse in leg.impulses), np.zeros(3)]

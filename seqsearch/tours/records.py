@@ -3,9 +3,13 @@
 from typing import final
 
 import msgspec
+from msgspec import UNSET, UnsetType
 
 Vector = tuple[float, float, float]
 """Three components, heliocentric J2000 ecliptic."""
+
+State = tuple[float, float, float, float, float, float]
+"""Position in m and velocity in m/s, heliocentric J2000 ecliptic."""
 
 
 class Record(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -34,6 +38,9 @@ class TourLeg(Record, frozen=True, kw_only=True):
         rest, otherwise that of a launch or of a fly-by.
     dropped_kg : float
         What is left behind at the arrival.
+    dep_body_state, arr_body_state : tuple of float, optional
+        Where the bodies are at departure and arrival, if they do not move by their elements.
+        The file says nothing where they do.
     """
 
     from_id: int
@@ -47,6 +54,8 @@ class TourLeg(Record, frozen=True, kw_only=True):
     dep_velocity_m_s: Vector = (0.0, 0.0, 0.0)
     arr_velocity_m_s: Vector = (0.0, 0.0, 0.0)
     dropped_kg: float = 0.0
+    dep_body_state: State | UnsetType = UNSET
+    arr_body_state: State | UnsetType = UNSET
 
     @property
     def is_fly_by(self) -> bool:
@@ -77,3 +86,11 @@ class TourBody(Record, frozen=True, kw_only=True):
     node_rad: float
     argp_rad: float
     mean_anomaly_rad: float
+
+
+@final
+class KernelFile(Record, frozen=True, kw_only=True):
+    """An SPK kernel: the name of the file and the SHA-256 of its content."""
+
+    name: str
+    sha256: str

@@ -1,4 +1,4 @@
-"""Rows of a trajectory integrated anew with DOP853: from each to the next, and through them all."""
+"""Rows integrated anew with DOP853: from each to the next, and through all of a phase."""
 
 import itertools
 from dataclasses import dataclass
@@ -94,7 +94,8 @@ def _integrate(
         place = x[:, :3]
         pull = place / np.linalg.norm(place, axis=1)[:, None] ** 3
         gain = push / (mass - burnt * share)[:, None] - pull
-        return (np.concatenate([x[:, 3:], gain], axis=1) * time).ravel()
+        rate: _Array = (np.concatenate([x[:, 3:], gain], axis=1) * time).ravel()
+        return rate
 
     try:
         solution = solve_ivp(

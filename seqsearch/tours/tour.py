@@ -2,11 +2,13 @@
 
 from typing import Any, Final, final
 
+from msgspec import UNSET, UnsetType
+
 from feasibility.constants import G0, MU_SUN
 from feasibility.errors import InputError
 from seqsearch.tours.display import dataframe, html_table, text_table
 from seqsearch.tours.events.protocol import TourEvent
-from seqsearch.tours.records import Record, TourBody, TourLeg
+from seqsearch.tours.records import KernelFile, Record, TourBody, TourLeg
 from seqsearch.tours.scores.protocol import ScoreRule
 from seqsearch.tours.scores.visits import VisitCount
 
@@ -26,6 +28,9 @@ class TourRules(Record, frozen=True, kw_only=True):
         Whether the body at which the tour starts counts as visited.
     score : ScoreRule
         What counts.
+    kernels : tuple of KernelFile, optional
+        SPK kernels that say how the bodies move, whose ids are then NAIF's. The file says nothing
+        where they move on Kepler orbits.
     """
 
     name: str
@@ -43,6 +48,7 @@ class TourRules(Record, frozen=True, kw_only=True):
     score: ScoreRule = VisitCount()
     mu_m3_s2: float = MU_SUN
     g0_m_s2: float = G0
+    kernels: tuple[KernelFile, ...] | UnsetType = UNSET
 
 
 @final

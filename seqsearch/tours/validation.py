@@ -86,6 +86,10 @@ def _of_leg(label: str, leg: TourLeg) -> Iterator[str]:
     for name in ("dep_velocity_m_s", "arr_velocity_m_s"):
         for value in getattr(leg, name):
             yield from _outside(f"{label}{name}", value, -_MAX_SPEED_M_S, _MAX_SPEED_M_S)
+    for name in ("dep_body_state", "arr_body_state"):
+        for k, value in enumerate(getattr(leg, name) or ()):
+            most = _MAX_A_M if k < 3 else _MAX_SPEED_M_S
+            yield from _outside(f"{label}{name}", value, -most, most)
     if not 1 <= len(leg.impulses) <= _MAX_IMPULSES:
         yield f"{label}{len(leg.impulses)} impulses, expected 1 to {_MAX_IMPULSES}"
     before = leg.t_dep_mjd2000 - _SLACK_DAYS

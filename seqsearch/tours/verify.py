@@ -1,13 +1,14 @@
 """Independent verification of a tour.
 
 Nothing here is shared with the leg solver or the search, neither code nor imports: bodies are
-propagated by solving Kepler's equation with scipy, legs by integrating the equations of
-motion with scipy's DOP853 between impulses, and every rule of the problem is
-checked again from the numbers in ``sequence.json``.
+propagated by solving Kepler's equation with scipy, or are where SPICE says that they are by the
+kernels of the problem, legs by integrating the equations of motion with scipy's DOP853 between
+impulses, and every rule of the problem is checked again from the numbers in ``sequence.json``.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import pairwise
+from pathlib import Path
 from typing import Final, Protocol
 
 import msgspec
@@ -16,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from feasibility.constants import AU
 from feasibility.errors import InputError
+from seqsearch.tours.bodies.kernel_states import kernel_states, missing_kernels
 from seqsearch.tours.checks import (
     SPEED_TOLERANCE_M_S,
     TIME_TOLERANCE_DAYS,
@@ -28,7 +30,12 @@ from seqsearch.tours.checks import (
 )
 from seqsearch.tours.events.make import event_kinds
 from seqsearch.tours.model_checks import check_masses, check_thrust
-from seqsearch.tours.motion import body_state, fly
+from seqsearch.tours.motion import (
+    arrival_state,
+    body_state,
+    departure_state,
+    fly_from,
+)
 from seqsearch.tours.tour import Tour, TourRules
 
 POSITION_TOLERANCE_KM: Final = 1000.0
@@ -36,6 +43,13 @@ POSITION_TOLERANCE_KM: Final = 1000.0
 
 VELOCITY_TOLERANCE_M_S: Final = 1.0
 """Largest velocity error at arrival (GTOC5, GTOC7 and GTOC12 problem statements)."""
+
+_BODY_TOLERANCE_M: Final = 1.0
+_BODY_TOLERANCE_M_S: Final = 1e-3
+"""How far bodies in a tour's file may be from where its kernels say that they are."""
+
+_States = Callable[[int, float], NDArray[np.float64]]
+"""The (6,) state of a body, m and m/s, by id and epoch in MJD2000."""
 
 _ELEMENT_TOLERANCE: Final = 1e-12
 _SCORE_TOLERANCE: Final = 1e-9
@@ -57,7 +71,10 @@ class ElementTable(Protocol):
 
 
 def verify_tour(
-    tour: Tour, catalogue: ElementTable | None = None, rules: TourRules | None = None
+    tour: Tour,
+    catalogue: ElementTable | None = None,
+    rules: TourRules | None = None,
+    kernels: Sequence[Path] = (),
 ) -> Verification:
     """Check a tour against its rules and the laws of motion.
 
@@ -70,6 +87,9 @@ def verify_tour(
     rules : TourRules, optional
         What the tour has to respect; default: what its own file says, which proves little
         where the file may have been changed.
+    kernels : sequence of Path
+        SPK kernels, for rules by which the bodies move as kernels say. Without those very files
+        the tour is not verified.
 
     Returns
     -------
@@ -80,9 +100,10 @@ def verify_tour(
         tour = msgspec.structs.replace(tour, rules=rules)
     if not tour.legs:
         return Verification((Check("at least one leg", False, "0", "1"),))
-    flown = FlownTour(tour.bodies, tour.legs, _arrivals(tour))
-    checks = [*_check_order(tour), *_check_times(tour), *check_masses(tour)]
-    checks += [*check_thrust(tour), *_check_arrivals(flown)]
+    checks = [*_check_order(tour), *_check_times(tour), *check_masses(tour), *check_thrust(tour)]
+    arrivals, of_bodies = _flown(tour, kernels)
+    flown = FlownTour(tour.bodies, tour.legs, arrivals)
+    checks += [*of_bodies, *_check_arrivals(flown)]
     given = {type(event) for event in tour.rules.events}
     absent = (kind.forbidden() for kind in event_kinds().values() if kind not in given)
     for event in (*tour.rules.events, *absent):
@@ -94,17 +115,75 @@ def verify_tour(
     return Verification(tuple(checks))
 
 
-def _arrivals(tour: Tour) -> tuple[Arrival | None, ...]:
+def _flown(
+    tour: Tour, kernels: Sequence[Path]
+) -> tuple[tuple[Arrival | None, ...], tuple[Check, ...]]:
+    """Integrate every leg between bodies as the rules let them move, and check these bodies."""
+    asked = tour.rules.kernels
+    if not asked:
+        mu = tour.rules.mu_m3_s2
+        bodies = {body.id: body for body in tour.bodies}
+        arrivals = _arrivals(tour, lambda body, t: body_state(bodies[body], t, mu))
+        return arrivals, _told(tour)
+    names = ", ".join(kernel.name for kernel in asked)
+    missing = missing_kernels(asked, kernels)
+    there = Check(
+        "kernels of the bodies at hand",
+        not missing,
+        f"missing or changed: {', '.join(missing)}" if missing else "the same files",
+        names,
+    )
+    nothing: tuple[Arrival | None, ...] = (None,) * len(tour.legs)
+    if missing:
+        return nothing, (there, Check("arrivals against the kernels", False, "not checked", names))
+    try:
+        with kernel_states(kernels) as states:
+            return _arrivals(tour, states), (there, _check_bodies(tour, states))
+    except InputError as error:
+        return nothing, (there, Check("arrivals against the kernels", False, str(error), names))
+
+
+def _told(tour: Tour) -> tuple[Check, ...]:
+    """Fail a tour whose bodies do not move by their elements, though the rules know no kernel."""
+    if not any(leg.dep_body_state or leg.arr_body_state for leg in tour.legs):
+        return ()
+    return (Check("bodies move by their elements", False, "states of their own", "Kepler orbits"),)
+
+
+def _arrivals(tour: Tour, states: _States) -> tuple[Arrival | None, ...]:
     """Integrate every leg; None where a body is missing, which the check of the order finds."""
     mu = tour.rules.mu_m3_s2
-    bodies = {body.id: body for body in tour.bodies}
+    known = {body.id for body in tour.bodies}
     return tuple(
         Arrival(
-            fly(leg, bodies[leg.from_id], mu), body_state(bodies[leg.to_id], leg.t_arr_mjd2000, mu)
+            fly_from(leg, states(leg.from_id, leg.t_dep_mjd2000), mu),
+            states(leg.to_id, leg.t_arr_mjd2000),
         )
-        if leg.from_id in bodies and leg.to_id in bodies
+        if {leg.from_id, leg.to_id} <= known
         else None
         for leg in tour.legs
+    )
+
+
+def _check_bodies(tour: Tour, states: _States) -> Check:
+    """Check the states of bodies that the file has, from which others draw and export the tour."""
+    mu = tour.rules.mu_m3_s2
+    bodies = {body.id: body for body in tour.bodies}
+    off = [np.zeros(6)]
+    for leg in tour.legs:
+        for body, epoch, state in (
+            (leg.from_id, leg.t_dep_mjd2000, departure_state),
+            (leg.to_id, leg.t_arr_mjd2000, arrival_state),
+        ):
+            if body in bodies:
+                off.append(state(leg, bodies[body], mu) - states(body, epoch))
+    worst_m = largest(float(np.linalg.norm(error[:3])) for error in off)
+    worst_m_s = largest(float(np.linalg.norm(error[3:])) for error in off)
+    return Check(
+        "bodies where the kernels say",
+        worst_m <= _BODY_TOLERANCE_M and worst_m_s <= _BODY_TOLERANCE_M_S,
+        f"largest error {worst_m:.3f} m, {1e3 * worst_m_s:.4f} mm/s",
+        f"{_BODY_TOLERANCE_M:g} m, {1e3 * _BODY_TOLERANCE_M_S:g} mm/s",
     )
 
 

@@ -8,6 +8,7 @@ rule of the problem is checked from the numbers in the exported file.
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from pathlib import Path
 from typing import Final, final
 
 import numpy as np
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 
 from feasibility.constants import DAY_S
 from feasibility.errors import InputError
+from seqsearch.tours.bodies.kernel_states import BodyState, states_by_rules
 from seqsearch.tours.checks import (
     MASS_TOLERANCE_KG,
     TIME_TOLERANCE_DAYS,
@@ -29,7 +31,6 @@ from seqsearch.tours.events.drop import Drop
 from seqsearch.tours.events.fly_by import FlyBy
 from seqsearch.tours.events.launch import Launch
 from seqsearch.tours.events.make import event_kinds
-from seqsearch.tours.motion import body_state
 from seqsearch.tours.records import TourBody, TourLeg, Vector
 from seqsearch.tours.row_motion import RowMotion, fly_rows
 from seqsearch.tours.tour import TourRules
@@ -90,6 +91,7 @@ def verify_rows(
     bodies: Mapping[str, TourBody],
     rules: TourRules,
     tolerances: Tolerances = Tolerances(),
+    kernels: Sequence[Path] = (),
 ) -> Verification:
     """Check rows against the rules of a problem and the laws of motion.
 
@@ -103,6 +105,8 @@ def verify_rows(
         What the flight has to respect.
     tolerances : Tolerances
         How exactly bodies have to be met.
+    kernels : sequence of Path
+        SPK kernels, for rules by which the bodies move as kernels say.
 
     Returns
     -------
@@ -112,9 +116,10 @@ def verify_rows(
     Raises
     ------
     InputError
-        A phase names a body that is not among them.
+        A phase names a body that is not among them, or kernels of the rules are missing.
     """
-    flown = [_flown(phase, bodies, rules) for phase in trajectory.phases]
+    with states_by_rules(rules, kernels) as where:
+        flown = [_flown(phase, bodies, rules, where) for phase in trajectory.phases]
     legs = _legs(flown, rules)
     stops = (
         flown[0].start,
@@ -137,7 +142,9 @@ def verify_rows(
     return Verification(tuple(checks))
 
 
-def _flown(phase: Phase, bodies: Mapping[str, TourBody], rules: TourRules) -> _Flown:
+def _flown(
+    phase: Phase, bodies: Mapping[str, TourBody], rules: TourRules, where: BodyState
+) -> _Flown:
     for name in (phase.start, phase.end):
         if name not in bodies:
             raise InputError(f"{phase}: no body {name!r}, expected one of the problem's table")
@@ -147,8 +154,8 @@ def _flown(phase: Phase, bodies: Mapping[str, TourBody], rules: TourRules) -> _F
         start,
         end,
         fly_rows(phase, rules.isp_s, rules.g0_m_s2, mu),
-        body_state(start, float(phase.t_mjd2000[0]), mu),
-        body_state(end, float(phase.t_mjd2000[-1]), mu),
+        where(start, float(phase.t_mjd2000[0])),
+        where(end, float(phase.t_mjd2000[-1])),
         mu,
     )
 

@@ -5,6 +5,7 @@ import pytest
 
 from feasibility import InputError, Legs, Spacecraft
 from feasibility.constants import AU
+from feasibility.orbits import Catalogue
 
 GOOD = {
     "rv_dep": [4e11, 0, 0, 0, 1.8e4, 0],
@@ -22,6 +23,8 @@ FACTORS = {
     "s": {"s": 1.0},
     "m": {"km": 1e3, "m": 1.0},
     "m/s": {"km/s": 1e3},
+    "rad": {"deg": np.pi / 180.0},
+    "": {"": 1.0},
 }
 
 
@@ -156,3 +159,39 @@ def test_plain_numbers_are_as_they_were():
     made = legs(rv_dep=[[4 * AU, 0, 0, 0, 1.5e4, 0]] * 3, tof_days=np.array([1, 2, 3]))
     assert len(made) == 3
     assert made.tof_days.dtype == np.float64
+
+
+def body(**changes):
+    given = {
+        "ids": [7],
+        "names": ["A"],
+        "epoch_mjd2000": 8000.0,
+        "elements": [[2.0 * AU, 0.1, 0.05, 1.0, 2.0, 3.0]],
+        "source": "a test",
+    }
+    return Catalogue(**{**given, **changes})
+
+
+@pytest.mark.parametrize("quantity", [LikeAstropy, LikePint])
+def test_elements_of_catalogues_are_converted(quantity):
+    angles = [quantity(value, "deg") for value in (3.0, 60.0, 120.0, 180.0)]
+    row = [quantity(3e8, "km"), quantity(0.1, ""), *angles]
+    made = body(elements=[row, row], ids=[1, 2], names=["A", "B"])
+    wanted = [3e11, 0.1, *np.radians([3.0, 60.0, 120.0, 180.0])]
+    np.testing.assert_allclose(made.elements, [wanted, wanted])
+    mixed = [3e11, 0.1, angles[0], 1.0, 2.0, 3.0]
+    assert body(elements=[mixed]).elements[0, 2] == pytest.approx(np.radians(3.0))
+    assert body(epoch_mjd2000=quantity(48000.0, "h")).epoch_mjd2000[0] == 2000.0
+
+
+@pytest.mark.parametrize("quantity", [LikeAstropy, LikePint])
+def test_elements_whose_units_would_be_dropped_are_refused(quantity):
+    plain = body().elements
+    with pytest.raises(InputError, match=r"Catalogue elements: has a unit \(km\)"):
+        body(elements=quantity(plain, "km"))
+    with pytest.raises(InputError, match=r"Catalogue elements: .*expected plain numbers in m$"):
+        body(elements=[[quantity(1.0, "kg"), *plain[0, 1:]]])
+    with pytest.raises(InputError, match=r"Catalogue extra 'mass': has a unit \(kg\)"):
+        body(extra={"mass": quantity([1.0], "kg")})
+    with pytest.raises(InputError, match=r"Catalogue elements: expected numbers"):
+        body(elements=[["far", 0, 0, 0, 0, 0]])

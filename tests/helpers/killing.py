@@ -67,10 +67,9 @@ def killed_often(
     """
     count = 0
     for k in range(kills):
-        late = killed(next_line(), rng.uniform(0.1, 0.9) * whole_s, twice=k % 3 == 2)
-        count += not late
-        if late:
-            break
+        if killed(next_line(), rng.uniform(0.1, 0.8) * whole_s, twice=k % 3 == 2):
+            return count
+        count += 1
     finished(next_line())
     return count
 

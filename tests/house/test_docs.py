@@ -90,12 +90,14 @@ def _entry_point_groups() -> set[str]:
     from seqsearch.problems import registry
     from seqsearch.tours import tour_files
     from seqsearch.tours.events import make as events
+    from seqsearch.tours.export import make as exports
     from seqsearch.tours.scores import make as scores
 
     return {
         registry.ENTRY_POINTS,
         events.ENTRY_POINTS,
         scores.ENTRY_POINTS,
+        exports.ENTRY_POINTS,
         tour_files.UPGRADES,
     }
 

@@ -17,6 +17,7 @@ PARTS = (
     "Sampler",
     "Tour event",
     "Score rule",
+    "Exporter",
 )
 
 

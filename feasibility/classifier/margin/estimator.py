@@ -17,7 +17,7 @@ from feasibility.classifier.margin.features import (
     margin_features,
     quick_features,
 )
-from feasibility.classifier.margin.final_mass import final_mass
+from feasibility.classifier.margin.final_mass import AS_IT_SAYS, final_mass
 from feasibility.classifier.margin.network import MarginNet
 from feasibility.classifier.margin.prediction import LegPrediction
 from feasibility.errors import InputError
@@ -65,6 +65,8 @@ class MarginEstimator:
             self._low, self._high = domain["low"], domain["high"]
             mass = artefact.section("final_mass")
             self._final_mass = MarginNet(mass) if mass else None
+            # Models of older versions were not calibrated.
+            self._error_fit = np.asarray(mass.get("error_fit", AS_IT_SAYS), dtype=np.float64)
         except KeyError as error:
             raise InputError(f"model: array {error} is missing") from None
 
@@ -158,13 +160,17 @@ class MarginEstimator:
         rows = np.flatnonzero(np.isfinite(log_margin))
         probability = np.full(len(legs), _UNKNOWN)
         probability[rows] = self._calibration.probability(log_margin[rows], doubt[rows])
-        mass = np.full(len(legs), np.nan)
-        mass[rows] = final_mass(legs.take(rows), X[rows], log_margin[rows], self._final_mass)
+        mass, error = np.full(len(legs), np.nan), np.full(len(legs), np.nan)
+        known = (legs, X, log_margin, doubt)
+        if len(rows) < len(legs):
+            known = (legs.take(rows), X[rows], log_margin[rows], doubt[rows])
+        mass[rows], error[rows] = final_mass(*known, self._final_mass, self._error_fit)
         return LegPrediction(
             margin=np.exp(log_margin),
             margin_error=doubt,
             probability=probability,
             final_mass=mass,
+            final_mass_error=error,
             in_domain=inside,
         )
 

@@ -1,8 +1,8 @@
-"""The mass at arrival with least propellant: what bounds it, and what the net adds.
+"""The mass at arrival with least propellant: what bounds it, a hint, and what the net adds.
 
 At m* the engine burns all the time; a lighter spacecraft coasts, and the lighter it is the
-nearer it comes to a few impulses. So the velocity change lies between that of
-Lambert's impulses, roughly, and that at m*; the net says where.
+nearer it comes to a few impulses. So the velocity change is at most that at m*. The hint is the
+least sum of impulses along a path in element space (`propellant_kernels`); the net corrects it.
 """
 
 from typing import Final
@@ -12,26 +12,43 @@ from numpy.typing import NDArray
 
 from feasibility.classifier.margin.features import FEATURES
 from feasibility.classifier.margin.network import MarginNet
+from feasibility.classifier.margin.path_kernels import N_NODES
 from feasibility.constants import MU_SUN
 from feasibility.legs import Legs
 
 _Array = NDArray[np.float64]
 
-FINAL_MASS_INPUTS: Final = (
+BOUND_INPUTS: Final = (
     *FEATURES,
     "inverse_margin",
     "log_margin",
     "log_lambert_to_full_thrust",
     "full_thrust_to_exhaust_velocity",
 )
+"""Names of the inputs of nets without the hint, as models before it have them; without unit."""
+
+FINAL_MASS_INPUTS: Final = (
+    *BOUND_INPUTS,
+    *(f"log_hint_{which}" for which in ("first", "before_last_two", "before_last", "last")),
+    "log_hint_dual",
+    "full_thrust_share",
+    *(f"impulse_share_{group}" for group in range(5)),
+    "hint_known",
+)
 """Names of the net's inputs, all without unit."""
 
 _LAMBERT: Final = [FEATURES.index(f"log_lambert_dv_{revs}_rev") for revs in range(3)]
 _LOG_IMPULSE: Final = FEATURES.index("log_impulse")
+_BESIDE: Final = FEATURES.index("chosen_beside_nearest")
 _LARGEST_SHARE: Final = 0.999
 """Share of m* that may be burnt at m*: a leg with more is beyond all use."""
 
 _LARGEST: Final = 3.0
+_LEAST_HINT: Final = 0.05
+"""Hints of less than this share of the change at m* are no arcs."""
+
+_NEARLY_FLYABLE: Final = -0.05
+"""log(m*/m0) above which the mass at arrival has an estimated error: m* itself has one."""
 
 
 def full_thrust_velocity(legs: Legs, log_margin: _Array) -> _Array:
@@ -53,7 +70,7 @@ def lambert_velocity(legs: Legs, X: _Array) -> _Array:
 
 
 def final_mass_inputs(legs: Legs, X: _Array, log_margin: _Array) -> _Array:
-    """Return `FINAL_MASS_INPUTS` (n, 84) of n legs on elliptic orbits.
+    """Return `FINAL_MASS_INPUTS` (n, 96) of n legs on elliptic orbits.
 
     Parameters
     ----------
@@ -64,38 +81,141 @@ def final_mass_inputs(legs: Legs, X: _Array, log_margin: _Array) -> _Array:
     log_margin : (n,) float64
         Estimate of log(m*/m0); below 0 counts as 0.
     """
+    return inputs_and_base(legs, X, log_margin)[0]
+
+
+def inputs_and_base(legs: Legs, X: _Array, log_margin: _Array) -> tuple[_Array, _Array]:
+    """Return the net's inputs (n, 96), and (n,) m/s, the velocity change that it corrects.
+
+    Parameters
+    ----------
+    legs, X, log_margin
+        As for `final_mass_inputs`.
+    """
     margin = np.maximum(log_margin, 0.0)
     full = full_thrust_velocity(legs, margin)
+    inputs = np.empty((len(legs), len(FINAL_MASS_INPUTS)))
+    inputs[:, : len(BOUND_INPUTS)] = _bound_inputs(legs, X, margin, full)
+    hint = _propellant_hint(legs, X)
+    known = hint[:, 3] > _LEAST_HINT * full
+    logs = np.log(np.where(known[:, None], hint[:, :5], full[:, None]) / full[:, None])
+    more = inputs[:, len(BOUND_INPUTS) :]
+    np.clip(logs, -_LARGEST, 1.0, out=more[:, :5])
+    more[:, 5:11] = hint[:, 5:]
+    more[:, 11] = known
+    return inputs, np.where(known, np.minimum(hint[:, 3], full), full)
+
+
+def _bound_inputs(legs: Legs, X: _Array, margin: _Array, full: _Array) -> _Array:
+    inputs = np.empty((len(legs), len(BOUND_INPUTS)))
     ratio = np.log(lambert_velocity(legs, X) / full)
-    return np.column_stack(
-        [
-            X,
-            np.exp(-margin),
-            np.minimum(margin, _LARGEST),
-            np.clip(ratio, -_LARGEST, _LARGEST),
-            np.minimum(full / legs.exhaust_velocity, _LARGEST),
-        ]
+    n = X.shape[1]
+    inputs[:, :n] = X
+    inputs[:, n] = np.exp(-margin)
+    inputs[:, n + 1] = np.minimum(margin, _LARGEST)
+    inputs[:, n + 2] = np.clip(ratio, -_LARGEST, _LARGEST)
+    inputs[:, n + 3] = np.minimum(full / legs.exhaust_velocity, _LARGEST)
+    return inputs
+
+
+def _propellant_hint(legs: Legs, X: _Array) -> _Array:
+    from feasibility.classifier.margin import propellant_kernels
+
+    hint = np.empty((len(legs), propellant_kernels.N_HINTS))
+    propellant_kernels.propellant_batch(
+        # Copies are writable, as the one compiled signature wants them.
+        legs.rv_dep.copy(),
+        legs.rv_arr.copy(),
+        legs.tof_s,
+        legs.exhaust_velocity,
+        legs.thrust * legs.tof_s / N_NODES / legs.m0,
+        np.rint(X[:, _BESIDE]),
+        MU_SUN,
+        hint,
     )
+    return hint
 
 
-def final_mass(legs: Legs, X: _Array, log_margin: _Array, net: MarginNet | None) -> _Array:
-    """Return (n,) kg, the mass at arrival with least propellant.
+def log_expected_error(doubt: _Array, margin_error: _Array, fit: _Array) -> _Array:
+    """Return (n,) the logarithm of the error of log(velocity change) that 68 % of legs are within.
+
+    A net is sure of itself where it has learned by heart; legs that it has not seen tell how
+    sure it should be.
+
+    Parameters
+    ----------
+    doubt : (n,) float64
+        Expected error of log(velocity change), by the net.
+    margin_error : (n,) float64
+        That of log(m*/m0).
+    fit : (3,) float64
+        Coefficients of 1 and of the logarithms of both.
+    """
+    logs: _Array = fit[0] + fit[1] * np.log(doubt) + fit[2] * np.log(margin_error)
+    return logs
+
+
+AS_IT_SAYS: Final = np.array([0.0, 1.0, 0.0])
+"""The fit for nets without one."""
+
+
+def final_mass(
+    legs: Legs,
+    X: _Array,
+    log_margin: _Array,
+    margin_error: _Array,
+    net: MarginNet | None,
+    error_fit: _Array = AS_IT_SAYS,
+) -> tuple[_Array, _Array]:
+    """Return the mass at arrival with least propellant and the error to expect.
 
     Parameters
     ----------
     legs, X, log_margin
         As for `final_mass_inputs`. Where the margin is negative the leg cannot be flown, and the
         answer is what full thrust all the time would leave.
+    margin_error : (n,) float64
+        Expected error of `log_margin`.
     net : MarginNet, optional
-        Estimates log(velocity change / that at m*); without it, the smaller bound is the answer.
+        Estimates log(velocity change / the base's); without it, the smaller bound is the answer.
+    error_fit : (3,) float64
+        As for `log_expected_error`.
+
+    Returns
+    -------
+    mass, error : (n,) float64, kg
+        The error is NaN without a net, and where the leg is evidently too heavy.
     """
-    change = full_thrust_velocity(legs, np.maximum(log_margin, 0.0))
+    most = np.maximum(legs.m0 - legs.thrust * legs.tof_s / legs.exhaust_velocity, 0.0)
+    mass, error = most, np.full(len(legs), np.nan)
+    rows = np.flatnonzero(log_margin >= _NEARLY_FLYABLE)
+    if not len(rows):
+        return mass, error
+    if len(rows) < len(legs):
+        legs, X, log_margin, most = legs.take(rows), X[rows], log_margin[rows], most[rows]
+        margin_error = margin_error[rows]
     if net is None:
-        change = np.minimum(change, lambert_velocity(legs, X))
+        full = full_thrust_velocity(legs, np.maximum(log_margin, 0.0))
+        change, doubt = np.minimum(full, lambert_velocity(legs, X)), np.full(len(rows), np.nan)
     else:
-        change = change * np.exp(net(final_mass_inputs(legs, X, log_margin))[0])
-    all_the_time = np.maximum(legs.m0 - legs.thrust * legs.tof_s / legs.exhaust_velocity, 0.0)
-    mass: _Array = np.where(
-        log_margin < 0.0, all_the_time, legs.m0 * np.exp(-change / legs.exhaust_velocity)
-    )
-    return mass
+        change, doubt = _corrected(legs, X, log_margin, net)
+        doubt = np.exp(log_expected_error(doubt, margin_error, error_fit))
+    # More than full thrust all the time cannot be burnt.
+    left = np.maximum(legs.m0 * np.exp(-change / legs.exhaust_velocity), most)
+    mass[rows] = np.where(log_margin < 0.0, most, left)
+    share = np.minimum(doubt * change / legs.exhaust_velocity, 1.0)
+    error[rows] = legs.m0 * np.exp(-change / legs.exhaust_velocity) * share
+    return mass, error
+
+
+def _corrected(legs: Legs, X: _Array, log_margin: _Array, net: MarginNet) -> tuple[_Array, _Array]:
+    """Return (n,) m/s, the velocity change, and the expected error of its logarithm."""
+    if net.inputs == len(BOUND_INPUTS):
+        # A model from before the hint.
+        margin = np.maximum(log_margin, 0.0)
+        base = full_thrust_velocity(legs, margin)
+        correction, doubt = net(_bound_inputs(legs, X, margin, base))
+    else:
+        inputs, base = inputs_and_base(legs, X, log_margin)
+        correction, doubt = net(inputs)
+    return base * np.exp(correction), doubt

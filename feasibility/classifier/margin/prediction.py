@@ -23,6 +23,10 @@ class LegPrediction:
     final_mass : (n,) float64, kg
         Estimate of the mass at arrival with least propellant, as
         `FeasibilityClassifier.final_mass` has it; NaN where nothing is known.
+    final_mass_error : (n,) float64, kg
+        How far from the least-propellant solution `final_mass` is at most on 68 % of legs like
+        this one, as one standard deviation would say; NaN where nothing is known, where the leg
+        is evidently too heavy, and with models that do not learn final masses.
     in_domain : (n,) bool
         Whether the leg lies within what the model was trained on.
     """
@@ -31,4 +35,5 @@ class LegPrediction:
     margin_error: NDArray[np.float64]
     probability: NDArray[np.float64]
     final_mass: NDArray[np.float64]
+    final_mass_error: NDArray[np.float64]
     in_domain: NDArray[np.bool_]

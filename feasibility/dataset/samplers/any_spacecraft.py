@@ -9,7 +9,7 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from feasibility.constants import AU, DAY_S, MU_SUN, mjd_to_mjd2000
-from feasibility.dataset.samplers.draws import Columns, Draw, check_ranges, collect
+from feasibility.dataset.samplers.draws import Columns, Draw, check_ranges, collect, log_uniform
 from feasibility.dataset.samplers.impulsive import ImpulsiveGrid
 from feasibility.legs import Legs, Spacecraft
 from feasibility.orbits import Catalogue, cartesian_to_classical, classical_to_cartesian
@@ -127,8 +127,8 @@ class AnySpacecraft(
             return self._orbit_pairs(m, rng, catalogue, usable)
 
         rows = collect(n, batch)
-        m0 = _log_uniform(rng, self.m0_kg, n)
-        thrust = m0 * _log_uniform(rng, self.acceleration_m_s2, n)
+        m0 = log_uniform(rng, self.m0_kg, n)
+        thrust = m0 * log_uniform(rng, self.acceleration_m_s2, n)
         slowest, fastest = self.acceleration_m_s2
         legs = Legs(
             rv_dep=classical_to_cartesian(rows["departure"]),
@@ -136,7 +136,7 @@ class AnySpacecraft(
             tof_days=rows["tof"],
             m0=m0,
             thrust=thrust,
-            isp=_log_uniform(rng, self.isp_s, n),
+            isp=log_uniform(rng, self.isp_s, n),
             m_dry=m0 * rng.uniform(*self.dry_share, n),
             t_dep_mjd2000=rows["t_dep"],
             dep_id=rows["dep_id"],
@@ -161,7 +161,7 @@ class AnySpacecraft(
             departure[known] = cartesian_to_classical(catalogue.states_at(rows, t_dep[known]))
             dep_id[known] = catalogue.ids[rows]
         near = rng.uniform(size=m) < self.near_share
-        size = _log_uniform(rng, self.disturbance, m)
+        size = log_uniform(rng, self.disturbance, m)
         disturbed = _disturbed(departure, size, rng.standard_normal((m, 6)))
         arrival = np.where(near[:, None], disturbed, self._orbits(rng, m))
         smaller = np.minimum(departure[:, 0], arrival[:, 0])
@@ -183,7 +183,7 @@ class AnySpacecraft(
 
     def _orbits(self, rng: Generator, m: int) -> NDArray[np.float64]:
         elements = np.empty((m, 6))
-        elements[:, 0] = AU * _log_uniform(rng, self.a_au, m)
+        elements[:, 0] = AU * log_uniform(rng, self.a_au, m)
         elements[:, 1] = rng.rayleigh(self.eccentricity_scale, m)
         elements[:, 2] = np.radians(rng.rayleigh(self.inclination_scale_deg, m))
         elements[:, 3:] = rng.uniform(0.0, 2.0 * np.pi, (m, 3))
@@ -200,11 +200,6 @@ class AnySpacecraft(
             & (elements[:, 2] < 0.5 * np.pi)
         )
         return within
-
-
-def _log_uniform(rng: Generator, bounds: tuple[float, float], n: int) -> NDArray[np.float64]:
-    low, high = np.log(bounds)
-    return np.exp(rng.uniform(low, high, n))
 
 
 def _disturbed(

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any, Final, final
 
 import numpy as np
+from numpy.random import Generator
 from numpy.typing import NDArray
 
 from feasibility.errors import InputError
@@ -75,6 +76,12 @@ def collect(n: int, batch: Callable[[int], Columns]) -> Columns:
                 "expected limits that keep more of the catalogue's pairs"
             )
     return {name: np.concatenate([part[name] for part in parts])[:n] for name in parts[0]}
+
+
+def log_uniform(rng: Generator, bounds: tuple[float, float], n: int) -> NDArray[np.float64]:
+    """Draw (n,) numbers, as many in each octave between two bounds."""
+    low, high = np.log(bounds)
+    return np.exp(rng.uniform(low, high, n))
 
 
 def check_pairs(catalogue: Catalogue) -> None:

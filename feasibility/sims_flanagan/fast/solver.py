@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from feasibility.constants import MU_SUN
 from feasibility.errors import InputError
 from feasibility.legs import Legs
+from feasibility.sims_flanagan.light_legs import are_light
 from feasibility.sims_flanagan.pykep_leg import N_SEGMENTS, confirm
 from feasibility.sims_flanagan.solutions import (
-    LIGHT,
     MISMATCH_TOLERANCE,
     THROTTLE_TOLERANCE,
     TWO_IMPULSE,
@@ -103,8 +103,9 @@ def fast_min_propellant(
 
     As only thrust over mass enters the motion, the maximum-initial-mass solution with
     its throttles times m0 / m* closes the leg at m0: it is the start. Legs of less than a
-    quarter of m* are also started from the cheapest two-impulse arcs, which wait, coast or
-    turn otherwise than the arc of m*; the best solution counts.
+    quarter of m*, long ones of less than half of it, are also started from the cheapest
+    two-impulse arcs, which wait, coast or turn otherwise than the arc of m*; the best
+    solution counts.
 
     Parameters
     ----------
@@ -182,7 +183,7 @@ def _restart_light(
     """Overwrite throttles, mass ratio and start of the light legs that other arcs serve better."""
     from feasibility.sims_flanagan.fast.restart_kernels import minimum_restarts
 
-    light = np.flatnonzero(legs.m0 * LIGHT < heaviest)
+    light = np.flatnonzero(are_light(legs, heaviest))
     if not len(light):
         return
     some = legs.take(light)

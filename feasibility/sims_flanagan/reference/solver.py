@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from feasibility.errors import InputError
 from feasibility.legs import Legs
+from feasibility.sims_flanagan.light_legs import are_light
 from feasibility.sims_flanagan.pykep_leg import CUT, N_SEGMENTS, confirm, scaled_leg
 from feasibility.sims_flanagan.reference.pygmo_problems import (
     MaximumMassProblem,
@@ -28,7 +29,6 @@ from feasibility.sims_flanagan.reference.starts import (
     two_impulse_starts,
 )
 from feasibility.sims_flanagan.solutions import (
-    LIGHT,
     MISMATCH_TOLERANCE,
     THROTTLE_TOLERANCE,
     TWO_IMPULSE,
@@ -203,8 +203,8 @@ def reference_min_propellant(
     The start is the maximum-initial-mass solution: as only thrust / mass
     enters the motion, its throttles times m0 / m* close the leg at m0 exactly.
     Each row is then improved by SLSQP, and by IPOPT where that fails; the
-    start itself remains where both do. A leg of less than a quarter of m* is
-    solved from the cheapest two-impulse arcs as well.
+    start itself remains where both do. A leg of less than a quarter of m*, or less
+    than half where it is long, is solved from the cheapest two-impulse arcs as well.
 
     Parameters
     ----------
@@ -264,7 +264,7 @@ def _minimise_propellant(legs: Legs, row: int, guess: LegSolutions) -> tuple[_Cl
         if found is not None and (best is None or found.m_final > best.m_final):
             best = found
             break
-    if lighter * LIGHT < 1.0:
+    if are_light(legs.take([row]), guess.m0[[row]]).item():
         for number, impulses in enumerate(two_impulse_starts(legs, row, guess.n_segments)):
             masses, final = _mass_profile(impulses, float(legs.exhaust_velocity[row]))
             push = legs.thrust[row] * legs.tof_s[row] / guess.n_segments / m0

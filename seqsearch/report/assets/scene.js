@@ -81,7 +81,10 @@ function labels(pen, spots, width, height, named) {
     const texts = named && width > 420 ? [stop.number + " " + stop.name.slice(0, 18), String(stop.number)] : [String(stop.number)];
     search: for (const text of texts) {
       const wide = pen.measureText(text).width;
-      for (const [dx, dy] of [[6, -5], [6, 13], [-wide - 6, -5], [-wide - 6, 13], [-wide / 2, -9], [-wide / 2, 19]]) {
+      // Outwards is where the path is not.
+      const away = ([dx, dy]) => -Math.hypot(at[0] + dx + wide / 2 - width / 2, at[1] + dy - 5 - height / 2);
+      const places = [[6, -5], [6, 13], [-wide - 6, -5], [-wide - 6, 13], [-wide / 2, -9], [-wide / 2, 19]];
+      for (const [dx, dy] of places.sort((a, b) => away(a) - away(b))) {
         const box = [at[0] + dx, at[1] + dy - 11, at[0] + dx + wide, at[1] + dy + 2];
         const inside = box[0] > 0 && box[1] > 0 && box[2] < width && box[3] < height;
         if (inside && taken.every((t) => box[2] < t[0] || box[0] > t[2] || box[3] < t[1] || box[1] > t[3])) {

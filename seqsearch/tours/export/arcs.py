@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 
 from feasibility.constants import DAY_S
 from feasibility.errors import InputError
+from seqsearch.tours.bodies.told_motion import motion_of
 from seqsearch.tours.export.protocol import Flight
-from seqsearch.tours.paths import body_states, epochs_between, row_step_days
+from seqsearch.tours.paths import epochs_between, row_step_days
 from seqsearch.tours.trajectory import Phase
 
 _NO_TIME_DAYS: Final = 1e-3 / DAY_S
@@ -158,7 +159,7 @@ def _stay(flight: Flight, number: int) -> list[Arc]:
             True,
             number,
             epochs,
-            body_states(body, epochs, mu),
+            motion_of(flight.tour, body, epochs),
             np.full(len(epochs), following.mass_kg[0]),
             np.zeros((len(epochs), 3)),
         )

@@ -12,9 +12,9 @@ import numpy as np
 
 from feasibility.constants import AU, MJD2000_MJD
 from feasibility.runtime.atomic import write_text
-from seqsearch.tours.as_flown import as_flown
 from seqsearch.tours.dates import date_of
 from seqsearch.tours.export.arcs import Arc, mission_arcs, words
+from seqsearch.tours.export.as_flown import as_flown
 from seqsearch.tours.export.protocol import Flight
 from seqsearch.tours.records import TourBody
 

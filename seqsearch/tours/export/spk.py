@@ -5,6 +5,8 @@ astropy read no other type of unequal steps. ``spk13`` is of type 13 (Hermite), 
 the flight and a thirtieth of the size, for SPICE itself.
 """
 
+import shutil
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final, final
@@ -12,7 +14,7 @@ from typing import Any, Final, final
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.errors import InputError, MissingDependencyError
+from feasibility.errors import InputError
 from feasibility.runtime.atomic import atomic_path
 from seqsearch.tours.export.arcs import FRAME, Arc, equatorial, mission_arcs, words
 from seqsearch.tours.export.epochs import seconds_past_j2000
@@ -47,8 +49,6 @@ class SpkExporter:
         ------
         InputError
             The file cannot be written.
-        MissingDependencyError
-            spiceypy is not installed.
         """
         rows = [_dense(arc, flight.tour.rules.mu_m3_s2) for arc in mission_arcs(flight)]
         et, states = _with_jumps(rows)
@@ -92,22 +92,27 @@ class Spk13Exporter:
 
 
 def _write(flight: Flight, path: Path, fill: Callable[[Any, int], None]) -> None:
-    try:
-        import spiceypy as spice
-    except ModuleNotFoundError:
-        raise MissingDependencyError(
-            "spiceypy is not installed, and SPK kernels need it; pip install 'seqsearch[spice]'"
-        ) from None
-    with atomic_path(path) as temporary:
-        # SPICE makes its files itself.
-        temporary.unlink()
+    # Imported here: it loads SPICE, which the other formats do not need.
+    import spiceypy as spice
+
+    # SPICE makes its files itself, and cuts names off after 255 characters.
+    with atomic_path(path) as temporary, tempfile.TemporaryDirectory() as folder:
+        made = Path(folder) / "tour.bsp"
         try:
-            handle = spice.spkopn(str(temporary), "seqsearch", _COMMENT_CHARACTERS)
-            spice.dafac(handle, _comment(flight))
-            fill(spice, handle)
-            spice.spkcls(handle)
+            handle = spice.spkopn(str(made), "seqsearch", _COMMENT_CHARACTERS)
+            try:
+                spice.dafac(handle, _comment(flight))
+                fill(spice, handle)
+            finally:
+                spice.spkcls(handle)
         except spice.utils.exceptions.SpiceyError as error:
-            raise InputError(f"{path}: SPICE cannot write it ({error.short})") from None
+            raise InputError(f"{path}: SPICE cannot write it ({_reason(error)})") from None
+        shutil.copyfile(made, temporary)
+
+
+def _reason(error: Exception) -> str:
+    """Return what SPICE says in a few words, without the path through its routines."""
+    return " ".join(str(getattr(error, "long", None) or error).split())[:160]
 
 
 def _comment(flight: Flight) -> list[str]:

@@ -8,13 +8,16 @@ import pytest
 from feasibility import FeasibilityClassifier, InputError, Legs
 from feasibility.classifier.margin.features import margin_features
 from feasibility.classifier.margin.final_mass import (
+    BOUND_INPUTS,
     FINAL_MASS_INPUTS,
     final_mass_inputs,
     full_thrust_velocity,
 )
 from feasibility.commands.cli import main
+from feasibility.constants import AU
 from feasibility.dataset import Dataset
-from feasibility.sims_flanagan import optimise
+from feasibility.orbits import classical_to_cartesian
+from feasibility.sims_flanagan import optimise, solve_max_initial_mass
 from feasibility.sims_flanagan.fast.compilation import sample_leg
 from tests.helpers.labelled import labelled_dataset
 
@@ -46,6 +49,23 @@ def trained(artefact, dataset, epochs=4):
         FINAL_MASS_RECIPE, epochs=epochs, batch=50, device="cpu", threads=1
     )
     return train_final_mass(artefact, [dataset], recipe)
+
+
+def solved_legs(n, seed):
+    """Return Earth-like to Mars-like legs of 300 to 800 days, lighter than m*, and the truth."""
+    rng = np.random.default_rng(seed)
+    orbits = np.zeros((2, n, 6))
+    orbits[..., 0] = AU * np.array([1.0, 1.52])[:, None]
+    orbits[..., 1] = np.array([0.017, 0.093])[:, None]
+    orbits[1, :, 2] = np.radians(1.85)
+    orbits[..., 3:] = rng.uniform(0.0, 2 * np.pi, (2, n, 3))
+    ends = (classical_to_cartesian(half) for half in orbits)
+    legs = Legs(*ends, rng.uniform(300.0, 800.0, n), 100.0, 0.3, 3000.0, 0.0)
+    heaviest = solve_max_initial_mass(legs)
+    legs = legs.with_m0(heaviest.m0 / np.exp(rng.uniform(0.0, np.log(10.0), n)))
+    solved = optimise(legs, guess=heaviest)
+    assert solved.converged.all()
+    return legs, solved.m_final
 
 
 def test_the_net_learns_final_masses_and_leaves_the_margins_alone(default, flown):
@@ -126,3 +146,60 @@ def test_the_command_adds_the_net_to_a_model(flown, tmp_path, monkeypatch, capsy
     assert main(arguments) == 2
     assert "--start" in capsys.readouterr().err
     assert main([*arguments, "--start", "default", "--balance", "adasyn"]) == 2
+
+
+def test_errors_of_final_masses_are_as_large_as_the_model_says(default):
+    legs, truth = solved_legs(60, seed=11)
+    told = default.predict(legs)
+    np.testing.assert_array_equal(told.final_mass_error, default.final_mass_error(legs))
+    miss = np.abs(told.final_mass - truth)
+    assert np.median(miss / truth) < 0.005
+    within = (miss < told.final_mass_error).mean()
+    assert 0.5 < within < 0.9
+    # Where it is less sure it is more often wrong.
+    unsure = told.final_mass_error / truth > np.median(told.final_mass_error / truth)
+    assert np.median((miss / truth)[unsure]) > np.median((miss / truth)[~unsure])
+
+
+def test_the_error_is_nan_where_there_is_no_flight_to_be_wrong_about(default):
+    leg = sample_leg()
+    heavy = leg.with_m0(3.0 * default.max_initial_mass(leg))
+    assert np.isnan(default.final_mass_error(heavy)).all()
+    nearly = leg.with_m0(1.001 * default.max_initial_mass(leg))
+    assert np.isfinite(default.final_mass_error(nearly)).all()
+    arrays = {k: v for k, v in default.artefact.arrays.items() if not k.startswith("final_mass/")}
+    bounds = FeasibilityClassifier(dataclasses.replace(default.artefact, arrays=arrays))
+    assert np.isnan(bounds.final_mass_error(leg)).all()
+    assert np.isfinite(bounds.final_mass(leg)).all()
+
+
+def test_models_from_before_the_hint_still_answer(default, flown):
+    k = len(BOUND_INPUTS)
+    old = dict(default.artefact.arrays)
+    del old["final_mass/error_fit"]
+    for name in ("mean", "std", "weight_0"):
+        old[f"final_mass/{name}"] = old[f"final_mass/{name}"][..., :k]
+    classifier = FeasibilityClassifier(dataclasses.replace(default.artefact, arrays=old))
+    told = classifier.predict(flown.legs)
+    assert np.isfinite(told.final_mass).all()
+    flyable = told.margin > 1.0
+    assert (told.final_mass_error[flyable] > 0.0).all()
+
+
+def test_a_net_of_other_inputs_is_refused_also_in_memory(default):
+    arrays = dict(default.artefact.arrays)
+    for name in ("mean", "std", "weight_0"):
+        arrays[f"final_mass/{name}"] = arrays[f"final_mass/{name}"][..., :50]
+    with pytest.raises(InputError, match="final_mass: 50 inputs, expected 84 or 96"):
+        FeasibilityClassifier(dataclasses.replace(default.artefact, arrays=arrays))
+    arrays = {**default.artefact.arrays, "model/std": np.zeros(80)}
+    with pytest.raises(InputError, match="std, expected more than zero"):
+        FeasibilityClassifier(dataclasses.replace(default.artefact, arrays=arrays))
+
+
+def test_no_more_is_burnt_than_full_thrust_all_the_time_burns(default):
+    legs, _ = solved_legs(20, seed=3)
+    for factor in (0.2, 1.0, 5.0):
+        some = legs.with_m0(factor * legs.m0)
+        most = some.m0 - some.thrust * some.tof_s / some.exhaust_velocity
+        assert (default.final_mass(some) >= np.maximum(most, 0.0)).all()

@@ -20,14 +20,18 @@ isp_s = 3000.0
 """
 
 
-def _disturbed(line, whole, rng, runs, check):
+def _disturbed(line, whole, rng, kills, check):
+    """Kill what makes a file or folder again and again, and check that it is like `whole`."""
+    # Kernels compiled in this process may differ in the last bits from those of the cache.
+    finished(line(whole.with_name(f"first-{whole.name}")))
     whole_s = finished(line(whole))
-    kills = 0
-    for k in range(runs):
+    count, k = 0, 0
+    while count < kills and k < 4 * kills:
         out = whole.with_name(f"{k}-{whole.name}")
-        kills += killed_often(lambda out=out: line(out), whole_s, 3, rng)
+        count += killed_often(lambda out=out: line(out), whole_s, 3, rng)
         check(out)
-    return kills
+        k += 1
+    return count
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +46,7 @@ def dataset(tmp_path_factory):
     def check(out):
         assert _same_rows(out, path)
 
-    return path, _disturbed(line, path, rng, 3, check)
+    return path, _disturbed(line, path, rng, 6, check)
 
 
 def _same_rows(one, other):
@@ -57,7 +61,7 @@ def _same_rows(one, other):
 
 @pytest.mark.slow
 def test_killed_datasets_are_the_same(dataset):
-    assert dataset[1] >= 5
+    assert dataset[1] >= 6
 
 
 @pytest.mark.slow
@@ -75,7 +79,7 @@ def test_killed_trainings_end_with_the_same_model(dataset, tmp_path):
         margins = [FeasibilityClassifier.load(path).margin(legs) for path in (out, whole)]
         np.testing.assert_array_equal(*margins)
 
-    assert _disturbed(line, whole, rng, 2, check) >= 3
+    assert _disturbed(line, whole, rng, 6, check) >= 6
 
 
 @pytest.mark.slow
@@ -94,4 +98,4 @@ def test_killed_retrainings_end_with_the_same_model(dataset, tmp_path):
         margins = [FeasibilityClassifier.load(path).margin(legs) for path in (out, whole)]
         np.testing.assert_array_equal(*margins)
 
-    assert _disturbed(line, whole, rng, 2, check) >= 3
+    assert _disturbed(line, whole, rng, 6, check) >= 6

@@ -240,7 +240,7 @@ def test_collect_keeps_the_order_of_what_is_accepted():
 
 def test_every_built_in_protocol_reads():
     names = builtin_protocols()
-    assert set(names) == {"table1", "limited", "search", "general", "paper"}
+    assert set(names) == {"table1", "limited", "search", "general", "paper", "transfers"}
     for name in names:
         assert read_protocol(name).name == name
     assert read_protocol("paper").label == "convergence"

@@ -5,9 +5,11 @@ import pytest
 
 from feasibility import Legs, optimise
 from feasibility.constants import AU, DAY_S, EARTH_VELOCITY, MU_SUN
+from feasibility.orbits import classical_to_cartesian
 from feasibility.orbits.lambert import lambert_delta_v
-from feasibility.sims_flanagan import solve_max_initial_mass
+from feasibility.sims_flanagan import Status, solve_max_initial_mass
 from feasibility.sims_flanagan.fast.solver import fast_max_initial_mass, fast_min_propellant
+from feasibility.sims_flanagan.light_legs import are_light
 from feasibility.sims_flanagan.solutions import TWO_IMPULSE
 from tests.helpers.long_legs import long_legs
 
@@ -131,3 +133,58 @@ def test_the_reference_returns_a_row_where_the_end_points_give_no_sense_of_rotat
     reference = solve_max_initial_mass(leg, method="reference")
     assert reference.converged.all()
     np.testing.assert_allclose(reference.m0, fast.m0, rtol=0.01)
+
+
+def test_long_legs_of_less_than_half_their_maximum_mass_try_other_arcs():
+    rng = np.random.default_rng(3)
+    n = 40
+    orbits = np.zeros((2, n, 6))
+    orbits[..., 0] = AU * np.array([1.0, 1.2])[:, None] * rng.uniform(0.9, 1.2, (2, n))
+    orbits[..., 1] = rng.uniform(0.0, 0.3, (2, n))
+    orbits[..., 2] = np.radians(rng.uniform(0.0, 6.0, (2, n)))
+    orbits[..., 3:] = rng.uniform(0.0, 2 * np.pi, (2, n, 3))
+    ends = (classical_to_cartesian(half) for half in orbits)
+    legs = Legs(*ends, rng.uniform(500.0, 1200.0, n), 100.0, 0.3, 3500.0, 0.0)
+    heaviest = fast_max_initial_mass(legs)
+    assert heaviest.converged.all()
+    lighter = legs.with_m0(heaviest.m0 / 3.0)
+    assert are_light(lighter, heaviest.m0).all()
+    solved = fast_min_propellant(lighter, guess=heaviest)
+    won = solved.start >= TWO_IMPULSE
+    assert won.any()
+    kept = heaviest.m_final / heaviest.m0
+    assert (solved.m_final[won] > lighter.m0[won] * kept[won]).all()
+    near = legs.with_m0(heaviest.m0 / 1.9)
+    assert not are_light(near, heaviest.m0).any()
+
+
+def test_short_legs_are_light_from_a_quarter_of_their_maximum_mass_on():
+    legs = long_legs(4, seed=1)
+    short = Legs(legs.rv_dep, legs.rv_arr, 30.0, [90.0, 40.0, 26.0, 24.0], 0.1, 3000.0, 0.0)
+    assert are_light(short, np.full(4, 100.0)).tolist() == [False, False, False, True]
+
+
+def degenerate_legs() -> Legs:
+    """Return legs whose end points give no plane, no sense of rotation or no arc at all."""
+    radius, speed = 2.7 * AU, EARTH_VELOCITY / np.sqrt(2.7)
+    ahead = [radius, 0, 0, 0, speed, 0]
+    ends = [
+        (ahead, [-radius, 0, 0, 0, -speed, 0], 1621.0),  # opposite
+        (ahead, [0, 0, radius, -speed, 0, 0], 500.0),  # over the pole
+        (ahead, ahead, 1.0),  # the same state
+        (ahead, [1.5 * radius, 0, 0, 0, 0.8 * speed, 0], 300.0),  # on one ray
+        (ahead, [0, -radius, 0, -speed, 0, 0], 900.0),  # backwards
+        ([radius, 0, 0, 4 * speed, 0, 0], [0, radius, 0, -speed, 0, 0], 400.0),  # unbound, radial
+    ]
+    dep, arr, tof = zip(*ends, strict=True)
+    return Legs(dep, arr, tof, 500.0, 0.3, 3000.0, 0.0)
+
+
+def test_the_reference_returns_a_row_for_every_degenerate_leg():
+    legs = degenerate_legs()
+    heaviest = solve_max_initial_mass(legs, method="reference", n_segments=6)
+    assert len(heaviest) == len(legs)
+    assert (np.isnan(heaviest.throttles).any(axis=(1, 2)) == ~heaviest.converged).all()
+    assert (heaviest.status[~heaviest.converged] == Status.NOT_CONVERGED).all()
+    solved = optimise(legs, method="reference", guess=heaviest)
+    assert (solved.converged == (solved.status == Status.CONVERGED)).all()

@@ -6,7 +6,8 @@ from scipy.integrate import solve_ivp
 
 from feasibility import InputError, Legs, impulses, max_initial_mass, optimise
 from feasibility.constants import AU, DAY_S, EARTH_VELOCITY, MU_SUN
-from feasibility.sims_flanagan import solve_max_initial_mass
+from feasibility.orbits import classical_to_cartesian
+from feasibility.sims_flanagan import Status, solve_max_initial_mass
 from tests.helpers.long_legs import long_legs
 
 
@@ -80,7 +81,7 @@ def test_bad_options_are_refused_in_one_line():
         optimise(leg, guess=guess, n_segments=20)
     with pytest.raises(InputError, match=r"mu: -1\.0, expected a positive number"):
         max_initial_mass(leg, mu=-1.0)
-    with pytest.raises(InputError, match="expected one of 'fast', 'reference', 'best'"):
+    with pytest.raises(InputError, match="expected one of 'fast', 'reference', 'best', 'auto'"):
         optimise(leg, method="slow")
 
 
@@ -122,3 +123,53 @@ def test_impulses_are_those_of_a_plain_loop_to_the_last_bit():
             masses[k] = mass
             mass *= float(np.exp(push * norms[k] / mass / exhaust))
         np.testing.assert_array_equal(dv[row], throttles * (push / masses)[:, None])
+
+
+def eccentric_legs(e_dep: float, e_arr: float, n: int, seed: int) -> Legs:
+    rng = np.random.default_rng(seed)
+    ends = []
+    for e in (e_dep, e_arr):
+        perihelion = rng.uniform(0.4, 1.0, n) if e > 0.5 else rng.uniform(1.0, 2.0, n)
+        orbits = np.empty((n, 6))
+        orbits[:, 0], orbits[:, 1] = AU * np.minimum(perihelion / (1 - e), 4.0), e
+        orbits[:, 2] = np.radians(rng.rayleigh(5.0, n))
+        orbits[:, 3:] = rng.uniform(0.0, 2 * np.pi, (n, 3))
+        ends.append(classical_to_cartesian(orbits))
+    return Legs(*ends, rng.uniform(400.0, 1200.0, n), 300.0, 0.3, 3000.0, 0.0)
+
+
+@pytest.mark.parametrize(("e_dep", "e_arr"), [(0.95, 0.1), (0.1, 0.95), (0.9, 0.9)])
+def test_very_eccentric_orbits_go_to_the_reference_too(e_dep, e_arr):
+    legs = eccentric_legs(e_dep, e_arr, 2, seed=2)
+    fast = solve_max_initial_mass(legs)
+    careful = solve_max_initial_mass(legs, method="auto")
+    assert careful.converged.all()
+    assert (careful.m0 >= fast.m0 * (1 - 1e-9)).all()
+    light = legs.with_m0(careful.m0 / 1.5)
+    solved = optimise(light, method="auto", guess=careful)
+    assert solved.converged.all()
+    assert (solved.m_final < light.m0).all()
+    assert np.isfinite(solved.throttles).all()
+
+
+def test_the_careful_method_is_the_fast_one_where_that_is_good():
+    legs = long_legs(6, seed=1)
+    heaviest = solve_max_initial_mass(legs)
+    assert heaviest.converged.all()
+    np.testing.assert_array_equal(max_initial_mass(legs, method="auto"), heaviest.m0)
+    light = legs.with_m0(0.8 * heaviest.m0)
+    solved = [optimise(light, method=method, guess=heaviest) for method in ("fast", "auto")]
+    np.testing.assert_array_equal(solved[0].m_final, solved[1].m_final)
+
+
+def test_legs_that_rounding_made_too_heavy_are_solved_at_their_maximum_mass():
+    leg = quarter_turn()
+    m_star = max_initial_mass(leg)[0]
+    heavier = leg.with_m0(m_star * 1.004)
+    assert optimise(heavier).status.tolist() == [Status.TOO_HEAVY]
+    solved = optimise(heavier, mass_tolerance=0.005)
+    assert solved.converged.all()
+    assert solved.m0[0] == pytest.approx(m_star)
+    assert optimise(heavier, mass_tolerance=0.003).status.tolist() == [Status.TOO_HEAVY]
+    with pytest.raises(InputError, match=r"mass_tolerance: -1\.0, expected 0 or more"):
+        optimise(leg, mass_tolerance=-1.0)

@@ -83,6 +83,27 @@ def test_the_view_in_space_turns_by_mouse_and_by_keys(browser, page):
     assert browser.messages == []
 
 
+def test_the_view_in_space_turns_by_touch_and_the_page_stays(browser, page):
+    browser.open(page, width=390)
+    browser.call("Emulation.setTouchEmulationEnabled", enabled=True)
+    try:
+        browser.run("document.getElementById('space').scrollIntoView()")
+        box = browser.run("document.getElementById('space').getBoundingClientRect().toJSON()")
+        before, top = _ink(browser, "space"), browser.run("scrollY")
+        x, y = box["x"] + 100, box["y"] + 150
+        for kind, points in (
+            ("touchStart", [{"x": x, "y": y}]),
+            ("touchMove", [{"x": x + 20, "y": y - 15}]),
+            ("touchMove", [{"x": x + 60, "y": y - 60}]),
+            ("touchEnd", []),
+        ):
+            browser.call("Input.dispatchTouchEvent", type=kind, touchPoints=points)
+        assert _ink(browser, "space") != before
+        assert browser.run("scrollY") == top
+    finally:
+        browser.call("Emulation.setTouchEmulationEnabled", enabled=False)
+
+
 def test_pointing_at_a_number_says_where_and_when(browser, page):
     browser.open(page, width=1440)
     browser.run("document.getElementById('ecliptic').scrollIntoView()")

@@ -35,18 +35,27 @@ def test_a_run_that_is_killed_and_its_polishing_end_alike(tmp_path):
     def polish_line(folder):
         return lambda: command("seqsearch", "polish", folder)
 
+    def alike(folder, line, seconds, *names):
+        kills, k = 0, 0
+        while kills < 6 and k < 24:
+            kills += killed_often(line(folder(k)), seconds, 3, rng)
+            assert _bytes(folder(k), *names) == _bytes(whole, *names)
+            k += 1
+        return kills
+
     whole = tmp_path / "whole"
-    whole_s = finished(run_line(whole)())
-    kills = 0
-    for k in range(3):
-        folder = tmp_path / f"run{k}"
-        kills += killed_often(run_line(folder), whole_s, 3, rng)
-        names = ("sequence.json", "sequence.csv", "sequence.search.json")
-        assert _bytes(folder, *names) == _bytes(whole, *names)
+    # Kernels compiled in this process may differ in the last bits from those of the cache.
+    finished(run_line(tmp_path / "first")())
+    run_s = finished(run_line(whole)())
+    names = ("sequence.json", "sequence.csv", "sequence.search.json")
+    assert alike(lambda k: tmp_path / f"run{k}", run_line, run_s, *names) >= 6
+
+    def copied(k):
+        folder = tmp_path / f"polish{k}"
+        if not folder.exists():
+            shutil.copytree(tmp_path / "first", folder)
+        return folder
+
     polish_s = finished(polish_line(whole)())
-    for k in range(2):
-        folder = tmp_path / f"run{k}"
-        kills += killed_often(polish_line(folder), polish_s, 3, rng)
-        names = ("sequence.json", "sequence.search.json", "sequence.polished.json")
-        assert _bytes(folder, *names) == _bytes(whole, *names)
-    assert kills >= 8
+    names = ("sequence.json", "sequence.search.json", "sequence.polished.json")
+    assert alike(copied, polish_line, polish_s, *names) >= 6

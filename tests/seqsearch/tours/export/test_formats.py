@@ -228,6 +228,18 @@ def test_a_file_is_written_whole_or_not_at_all(flight, tmp_path, kind):
     assert list(tmp_path.iterdir()) == [path]
 
 
+def test_a_path_may_be_longer_than_spice_takes_it(flight, tmp_path):
+    jplephem = pytest.importorskip("jplephem.spk", reason="jplephem is not installed")
+    deep = tmp_path
+    for _ in range(6):
+        deep /= "a rather long name of a folder, as some people have them"
+    deep.mkdir(parents=True)
+    make_exporter("spk13").write(flight, deep / "tour.bsp")
+    with jplephem.SPK.open(str(deep / "tour.bsp")) as kernel:
+        assert len(kernel.segments) == len(mission_arcs(flight))
+    assert list(deep.iterdir()) == [deep / "tour.bsp"]
+
+
 def test_rows_want_thrust(flight, tmp_path):
     with pytest.raises(InputError, match="refine"):
         make_exporter("rows").write(flight, tmp_path / "tour.rows")

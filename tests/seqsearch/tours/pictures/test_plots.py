@@ -10,7 +10,7 @@ from feasibility.errors import InputError
 from seqsearch import plot_mass, plot_path, plot_thrust, plot_timeline, plot_tour
 from seqsearch.commands.cli import main
 from seqsearch.tours.dates import date_of
-from seqsearch.tours.stops import stops
+from seqsearch.tours.pictures.stops import stops
 from seqsearch.tours.tour_files import to_json
 from tests.helpers.handmade_tours import handmade_tour
 

@@ -12,9 +12,10 @@ import numpy as np
 
 from feasibility.constants import AU
 from feasibility.runtime.atomic import atomic_path
+from seqsearch.tours.bodies.told_motion import motion_of
 from seqsearch.tours.dates import date_of
-from seqsearch.tours.paths import body_states, impulsive_trajectory, orbit_points
-from seqsearch.tours.stops import stops
+from seqsearch.tours.paths import impulsive_trajectory, orbit_points
+from seqsearch.tours.pictures.stops import stops
 from seqsearch.tours.tour import Tour
 
 if TYPE_CHECKING:
@@ -25,6 +26,9 @@ _MPL_MJD2000: Final = 10957.0
 
 _BLUE, _ORANGE, _GREEN, _GREY = "#0072b2", "#e69f00", "#009e73", "#767676"
 """Of Okabe and Ito's palette, which the colour-blind tell apart."""
+
+_CROWDED: Final = 0.06
+"""Stops whose distance is less than this share of that from the Sun share a place."""
 
 _LONGEST_NAME: Final = 20
 _STYLE: Final[dict[Any, Any]] = {
@@ -98,18 +102,23 @@ def plot_path(tour: Tour, axes: "Axes") -> None:
         colour = colormaps["viridis"](0.86 * k / max(1, len(phases) - 1))
         track = phase.states[:, :2] / AU
         axes.plot(track[:, 0], track[:, 1], color=colour, linewidth=1.7, zorder=2)
-    mu = tour.rules.mu_m3_s2
+    marked: list[tuple[float, float]] = []
     for stop in stops(tour):
-        x, y = (body_states(stop.body, [stop.t_mjd2000], mu)[0, :2] / AU).tolist()
+        x, y = (motion_of(tour, stop.body, [stop.t_mjd2000])[0, :2] / AU).tolist()
         axes.plot(x, y, "o", color="black", markersize=2.8, zorder=4)
-        outwards = 9.0 / max(float(np.hypot(x, y)), 1e-9)
+        radius = max(float(np.hypot(x, y)), 1e-9)
+        # Where an earlier number stands already, the later one stands further out.
+        crowd = sum(np.hypot(x - a, y - b) < _CROWDED * radius for a, b in marked)
+        marked.append((x, y))
+        outwards = (9.0 + 10.0 * crowd) / radius
         axes.annotate(
-            str(stop.number), (x, y), xytext=(outwards * x, outwards * y), textcoords="offset points",
-            ha="center", va="center", fontsize=8, fontweight="bold", zorder=5,
+            str(stop.number), (x, y), xytext=(outwards * x, outwards * y),
+            textcoords="offset points", ha="center", va="center", fontsize=8,
+            fontweight="bold", zorder=5,
         )  # fmt: skip
         if stop.stay_days:
             days = np.linspace(0.0, stop.stay_days, 12)
-            stay = body_states(stop.body, stop.t_mjd2000 + days, mu)[:, :2] / AU
+            stay = motion_of(tour, stop.body, stop.t_mjd2000 + days)[:, :2] / AU
             axes.plot(stay[:, 0], stay[:, 1], color=_ORANGE, linewidth=2.6, zorder=3)
     axes.plot(0, 0, "o", color=_ORANGE, markeredgecolor="black", markeredgewidth=0.5)
     axes.set_aspect("equal", adjustable="datalim")

@@ -1,0 +1,1 @@
+"""Where the bodies of a tour are, where that does not follow from their elements."""

@@ -1,0 +1,1 @@
+"""Pictures of tours, and what tells their numbers: see `plots`."""
