@@ -1,8 +1,8 @@
 """What the documentation's site has beside the pages of this folder.
 
 The pages are written for a code-hosting site. Here their navigation is made from README.md,
-CONTRIBUTING.md and CHANGELOG.md join them, and the reference is made: of the public names of both
-packages from their docstrings, of the commands from their help.
+CONTRIBUTING.md, CHANGELOG.md and the files that pages link to join them, and the reference is
+made: of the public names of both packages from their docstrings, of the commands from their help.
 """
 
 import ast
@@ -57,7 +57,25 @@ def on_files(files: Any, config: Any) -> Any:
     pages |= {page: (ROOT / name).read_text("utf-8") for name, page in JOINING.items()}
     for page, text in pages.items():
         files.append(File.generated(config, page, content=text))
+    for path in _linked_files():
+        files.append(File.generated(config, _copied(path), abs_src_path=str(path)))
     return files
+
+
+def _copied(path: Path) -> str:
+    """Return where the site has a file that is no page."""
+    return f"files/{path.relative_to(ROOT).as_posix()}"
+
+
+def _linked_files() -> list[Path]:
+    """Return the files outside this folder, pages excepted, to which pages link."""
+    found = set()
+    for page in [*DOCS.rglob("*.md"), *(ROOT / name for name in JOINING)]:
+        for target in re.findall(r"\]\((?!\w+:)([^)#\s]+)", page.read_text(encoding="utf-8")):
+            path = Path(os.path.normpath(page.parent / target))
+            if path.is_file() and not path.is_relative_to(DOCS) and path.name not in JOINING:
+                found.add(path)
+    return sorted(found)
 
 
 def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
@@ -80,6 +98,8 @@ def _led(text: str, source: str) -> str:
             there = JOINING[file.name]
         elif file.is_relative_to(DOCS):
             there = file.relative_to(DOCS).as_posix()
+        elif file.is_file():
+            there = _copied(file)
         else:
             return match[0]
         here = PurePosixPath(source).parent.as_posix()

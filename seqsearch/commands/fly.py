@@ -20,7 +20,7 @@ refine, export and report take it. If the sequence breaks, its longest part that
 written, and a line says which leg fails and how far it is from feasible.
 
   seqsearch fly 3673 2764 5753 --problem demo
-  seqsearch fly 14101 10973 2346 --problem gtoc7 --catalogue GTOC7-DATA.txt
+  seqsearch fly 14101 10973 2346 --problem belt.toml --catalogue asteroids.txt
   seqsearch fly --problem mine.toml             with sequence = [...] in its table [mission]
 
 Exit codes: 0 the whole sequence is flown, 1 it breaks.

@@ -15,28 +15,6 @@ from feasibility.runtime.pykep_guard import load_pykep
 
 
 @pytest.fixture(scope="module")
-def test_the_densest_are_those_whose_nth_neighbour_is_nearest():
-    belt = synthetic_main_belt(6000, np.random.default_rng(5))
-    neighbours = OrbitalNeighbours(belt)
-    rows = np.random.default_rng(6).permutation(6000)[:5500]
-    points = orbital_metric(belt.states(600.0), 180.0)
-    near = neighbours.query(rows, 600.0, 8)
-    distance = np.linalg.norm(points[near[:, -1]] - points[rows], axis=1)
-    for count in (1, 40, 700, 5500, 9000):
-        found = neighbours.densest(rows, 600.0, 8, count)
-        assert (np.diff(found) > 0).all()
-        assert set(np.argsort(distance)[:count]) <= set(found.tolist())
-    assert len(neighbours.densest(rows, 600.0, 8, 40)) < 1000
-
-
-def test_many_queries_at_once_are_answered_as_few_are():
-    belt = synthetic_main_belt(6000, np.random.default_rng(5))
-    neighbours = OrbitalNeighbours(belt)
-    rows = np.random.default_rng(7).permutation(6000)
-    few = [neighbours.query(part, 600.0, 5) for part in np.array_split(rows, 3)]
-    assert_array_equal(neighbours.query(rows, 600.0, 5), np.concatenate(few))
-
-
 def belt():
     return synthetic_main_belt(300, np.random.default_rng(9))
 
@@ -157,3 +135,25 @@ def test_bad_arguments_are_refused(belt, call, message):
 
 def test_no_rows_have_no_neighbours(belt):
     assert OrbitalNeighbours(belt).query([], [], 4).shape == (0, 4)
+
+
+def test_the_densest_are_those_whose_nth_neighbour_is_nearest():
+    belt = synthetic_main_belt(6000, np.random.default_rng(5))
+    neighbours = OrbitalNeighbours(belt)
+    rows = np.random.default_rng(6).permutation(6000)[:5500]
+    points = orbital_metric(belt.states(600.0), 180.0)
+    near = neighbours.query(rows, 600.0, 8)
+    distance = np.linalg.norm(points[near[:, -1]] - points[rows], axis=1)
+    for count in (1, 40, 700, 5500, 9000):
+        found = neighbours.densest(rows, 600.0, 8, count)
+        assert (np.diff(found) > 0).all()
+        assert set(np.argsort(distance)[:count]) <= set(found.tolist())
+    assert len(neighbours.densest(rows, 600.0, 8, 40)) < 1000
+
+
+def test_many_queries_at_once_are_answered_as_few_are():
+    belt = synthetic_main_belt(6000, np.random.default_rng(5))
+    neighbours = OrbitalNeighbours(belt)
+    rows = np.random.default_rng(7).permutation(6000)
+    few = [neighbours.query(part, 600.0, 5) for part in np.array_split(rows, 3)]
+    assert_array_equal(neighbours.query(rows, 600.0, 5), np.concatenate(few))
