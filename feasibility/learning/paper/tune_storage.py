@@ -60,7 +60,7 @@ def _opened(optuna: Any, storage: Path | str, name: str) -> Any:
         except Exception as error:
             # Databases have errors of their own. Of two processes that make the same tables at
             # the same time one fails, and finds them there at its next try.
-            if tries_left and "exist" in str(error):
+            if tries_left and re.search("exist|UNIQUE", str(error)):
                 time.sleep(0.2)
                 continue
             raise InputError(

@@ -62,7 +62,10 @@ def kernel_files(path: Path) -> KernelFiles:
         files = sorted(file for file in path.iterdir() if file.is_file())
         found = _sorted(path, files)
         if not found.spk:
-            raise InputError(f"{path}: has no SPK kernel, expected a file of type DAF/SPK in it")
+            raise InputError(
+                f"{path}: is a folder without SPK kernels, expected an asteroid table, or a "
+                "folder of kernels"
+            )
         return found
     head = _head(path)
     if head.startswith(_SPK):

@@ -42,14 +42,14 @@ _STYLE: Final[dict[Any, Any]] = {
 }
 
 
-def plot_tour(tour: Tour, path: Path) -> None:
+def plot_tour(tour: Tour, path: Path | str) -> None:
     """Draw a tour into a PNG, SVG or PDF file (by its suffix).
 
     Parameters
     ----------
     tour : Tour
         The tour.
-    path : Path
+    path : Path or str
         Where to write; replaced if it exists.
 
     Raises
@@ -61,6 +61,7 @@ def plot_tour(tour: Tour, path: Path) -> None:
     from matplotlib import rc_context
     from matplotlib.figure import Figure
 
+    path = Path(path)
     kind = path.suffix.lstrip(".") or "png"
     with rc_context(_STYLE), warnings.catch_warnings():
         # A name may have characters that no font of this machine has; a box stands for them.
