@@ -50,4 +50,4 @@ def test_protocols_are_listed_and_printed(capsys):
     assert main(["protocols", "table1"]) == 0
     assert capsys.readouterr().out == builtin_protocols()["table1"]
     assert main(["protocols", "table2"]) == 2
-    assert "no such protocol; known are general, limited" in capsys.readouterr().err
+    assert "no such protocol; known are arrival, flyby, general" in capsys.readouterr().err

@@ -276,7 +276,7 @@ def test_bad_meta_kernels_and_folders_are_one_line(tmp_path):
     one_line(tmp_path, "no leap seconds")
     empty = tmp_path / "empty"
     empty.mkdir()
-    one_line(empty, "no SPK kernel")
+    one_line(empty, "is a folder without SPK kernels")
 
 
 def test_damaged_kernels_are_one_line(kernel):
