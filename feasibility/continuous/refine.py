@@ -33,8 +33,9 @@ _ITERATIONS: Final = 60
 _PROX: Final = 0.05
 _PROX_RANGE: Final = (2e-3, 1e4)
 _BEND: Final = 1e-3
+_SETTLED_GAP: Final = 1e-5
 _SETTLE_AFTER: Final = 3
-"""Iterations after which the arrival is moved with ever more caution."""
+"""Iterations with so small a gap after which the arrival is moved with ever more caution."""
 
 _NEAR: Final = 1e-4
 """Gap from which throttles are near enough to a solution to be flown from the departure on."""
@@ -126,9 +127,10 @@ def _from_path(model: LegModel, point: Point, path: _Array) -> Point:
 def _iterate(model: LegModel, point: Point) -> tuple[Point, bool, int]:
     """Return the best point, whether it is closed and stationary, and the iterations."""
     multipliers = np.zeros(6)
-    prox = _PROX
+    prox, settling = _PROX, 0
     for iteration in range(1, _ITERATIONS + 1):
-        bend = _BEND * 4.0 ** max(0, iteration - _SETTLE_AFTER)
+        settling += point.gap_size < _SETTLED_GAP
+        bend = _BEND * 4.0 ** max(0, settling - _SETTLE_AFTER)
         step = model.best_step(model.linearised(point), Caution(prox, bend), multipliers)
         trial = model.after(point, step)
         promised, gained = _gains(model, point, step, trial)
