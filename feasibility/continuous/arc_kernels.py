@@ -26,7 +26,7 @@ _Array = NDArray[np.float64]
 
 @inner_kernel
 def steps_of(x: _Array, dt: float) -> int:
-    """Return into how many steps a segment is cut."""
+    """Return into how many steps what is left of a segment is cut, from where it is now."""
     radius = math.sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2])
     return 1 + int(dt / (STEP * radius * math.sqrt(radius)))
 
@@ -59,9 +59,11 @@ def shoot(x0: _Array, u: _Array, dt: _Array, push: float, burn: float, nodes: _A
         x[:] = nodes[k, :6]
         mass = nodes[k, 6]
         s = math.sqrt(u[k, 0] ** 2 + u[k, 1] ** 2 + u[k, 2] ** 2)
-        steps = steps_of(x, dt[k])
-        h = dt[k] / steps
-        for _ in range(steps):
+        left = dt[k]
+        while left > 0.0:
+            steps = steps_of(x, left)
+            h = left / steps
+            left = left - h if steps > 1 else 0.0
             motion(x, mass, u[k], s, push, burn, w, q, r)
             end_of(r, h, end, int(0))
             x[:] = end[:, 0]
@@ -114,9 +116,12 @@ def shoot_derivatives(
         x[:] = nodes[k, :6]
         mass = nodes[k, 6]
         s = math.sqrt(u[k, 0] ** 2 + u[k, 1] ** 2 + u[k, 2] ** 2)
-        steps = steps_of(x, dt[k])
-        h = dt[k] / steps
-        for i in range(steps):
+        left = dt[k]
+        while left > 0.0:
+            steps = steps_of(x, left)
+            h = left / steps
+            passed = dt[k] - left
+            left = left - h if steps > 1 else 0.0
             motion(x, mass, u[k], s, push, burn, w, q, r)
             gradient(w, q, r, five, square, g)
             for column in range(COLUMNS):
@@ -129,7 +134,7 @@ def shoot_derivatives(
                 force(column, mass, u[k], s, push, burn, forcing)
                 variation(g, forcing, d)
                 end_of(d, h, step, column)
-            _compose(step, jacobian[k], burn * h * i, i == 0)
+            _compose(step, jacobian[k], burn * passed, passed == 0.0)
             end_of(r, h, end, int(0))
             x[:] = end[:, 0]
             mass -= burn * s * h

@@ -42,12 +42,10 @@ class _Attempt:
     catch_up: bool
 
 
-_ATTEMPTS: Final = (
-    _Attempt(TIME_PRICE, catch_up=False),
-    _Attempt(TIME_PRICE, catch_up=True),
-    _Attempt(20.0, catch_up=True),
-    _Attempt(8.0, catch_up=True),
-    _Attempt(4.0, catch_up=True),
+_ATTEMPTS: Final = tuple(
+    _Attempt(price, catch_up)
+    for price in (TIME_PRICE, 20.0, 8.0, 5.0, 3.5)
+    for catch_up in (False, True)
 )
 """Times are kept first; where that leaves too little mass, time is spent on propellant."""
 
@@ -84,7 +82,7 @@ def refine_tour(
         raise InputError("the tour has no leg, so there is nothing to refine")
     if time_price is not None and not 0.0 < time_price < np.inf:
         raise InputError(f"time price {time_price:g}, expected more than 0")
-    attempts: tuple[_Attempt, ...] = _ATTEMPTS
+    attempts = _ATTEMPTS
     if time_price is not None:
         attempts = (_Attempt(time_price, catch_up=False), _Attempt(time_price, catch_up=True))
     failures = []

@@ -230,7 +230,7 @@ def _check_times(
     flown: Sequence[_Flown], legs: Sequence[TourLeg], rules: TourRules
 ) -> list[Check]:
     earliest, latest = rules.first_departure_mjd2000
-    first, last = flown[0].phase.t_mjd2000[0], flown[-1].phase.t_mjd2000[-1]
+    first, last = float(flown[0].phase.t_mjd2000[0]), float(flown[-1].phase.t_mjd2000[-1])
     shortest = smallest(
         after.t_dep_mjd2000 - before.t_arr_mjd2000
         for before, after in pairwise(legs)
