@@ -99,10 +99,17 @@ def fly_run(config: Config, folder: Path, seed: int, limits: Limits) -> int:
         )
     if code != 0:
         return code
-    broken = _completed(build_problem(config), folder, config)
-    if broken:
-        say(broken)
-    return 1 if broken else 0
+    if len(read_tour(folder / SEQUENCE).bodies) < len(config.mission.sequence):
+        broken = _completed(build_problem(config), folder, config)
+        if broken and (limits.time_limit_s is not None or limits.max_solves is not None):
+            broken += "; the limit may have been too short to find it"
+        if broken:
+            say(broken)
+            return 1
+    tour = read_tour(folder / SEQUENCE)
+    say(tour.one_line())
+    say(f"the whole sequence: {tour.summary()}")
+    return 0
 
 
 def _completed(problem: Problem, path: Path, config: Config) -> str:
@@ -131,8 +138,6 @@ def _completed(problem: Problem, path: Path, config: Config) -> str:
             RunFolder.open(path).write_polished(tour)
             plot_tour(tour, path / "tour.png")
         say(f"appended {after}: {tour.summary()}", Level.PROGRESS)
-    say(tour.one_line())
-    say(f"the whole sequence: {tour.summary()}")
     return ""
 
 

@@ -9,7 +9,14 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from feasibility.constants import AU, DAY_S, MU_SUN, mjd_to_mjd2000
-from feasibility.dataset.samplers.draws import Columns, Draw, check_ranges, collect, log_uniform
+from feasibility.dataset.samplers.draws import (
+    Columns,
+    Draw,
+    check_ranges,
+    collect,
+    log_uniform,
+    rayleigh_orbits,
+)
 from feasibility.dataset.samplers.free_ends import FreeEnds
 from feasibility.dataset.samplers.impulsive import ImpulsiveGrid
 from feasibility.legs import Legs, Spacecraft
@@ -105,8 +112,6 @@ class AnySpacecraft(
             m0_kg=self.m0_kg,
             dry_share=self.dry_share,
         )
-        if self.dry_share[1] > 1:
-            raise ValueError(f"dry_share = {list(self.dry_share)}, expected at most 1")
 
     def draw(
         self,
@@ -195,12 +200,9 @@ class AnySpacecraft(
         return {name: column[kept] for name, column in columns.items()}
 
     def _orbits(self, rng: Generator, m: int) -> NDArray[np.float64]:
-        elements = np.empty((m, 6))
-        elements[:, 0] = AU * log_uniform(rng, self.a_au, m)
-        elements[:, 1] = rng.rayleigh(self.eccentricity_scale, m)
-        elements[:, 2] = np.radians(rng.rayleigh(self.inclination_scale_deg, m))
-        elements[:, 3:] = rng.uniform(0.0, 2.0 * np.pi, (m, 3))
-        return elements
+        return rayleigh_orbits(
+            rng, m, self.a_au, self.eccentricity_scale, self.inclination_scale_deg
+        )
 
     def _within(self, elements: NDArray[np.float64]) -> NDArray[np.bool_]:
         a, e = elements[:, 0] / AU, elements[:, 1]

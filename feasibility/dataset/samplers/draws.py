@@ -8,6 +8,7 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
+from feasibility.constants import AU
 from feasibility.errors import InputError
 from feasibility.legs import Legs, Spacecraft
 from feasibility.orbits import Catalogue
@@ -84,6 +85,26 @@ def log_uniform(rng: Generator, bounds: tuple[float, float], n: int) -> NDArray[
     return np.exp(rng.uniform(low, high, n))
 
 
+def rayleigh_orbits(
+    rng: Generator,
+    n: int,
+    a_au: tuple[float, float],
+    eccentricity_scale: float,
+    inclination_scale_deg: float,
+) -> NDArray[np.float64]:
+    """Draw (n, 6) classical elements, m and rad.
+
+    Semi-major axes are log-uniform, eccentricities (which may exceed 1) and inclinations Rayleigh
+    distributed about the modes given, and angles uniform.
+    """
+    elements = np.empty((n, 6))
+    elements[:, 0] = AU * log_uniform(rng, a_au, n)
+    elements[:, 1] = rng.rayleigh(eccentricity_scale, n)
+    elements[:, 2] = np.radians(rng.rayleigh(inclination_scale_deg, n))
+    elements[:, 3:] = rng.uniform(0.0, 2.0 * np.pi, (n, 3))
+    return elements
+
+
 def check_pairs(catalogue: Catalogue) -> None:
     """Raise InputError where a catalogue has no pair of bodies."""
     if len(catalogue) < 2:
@@ -105,6 +126,7 @@ _MOST: Final = {
     "vinf_km_s": (300.0, "; is it in m/s?"),
     "excess_of_circular": (10.0, "; is it in km/s?"),
     "isp_s": (2e4, "; is it in m/s, an exhaust velocity?"),
+    "dry_share": (1.0, ""),
 }
 """Largest numbers of ranges, and what larger ones usually are."""
 

@@ -1,6 +1,6 @@
 """Sampler of legs that leave the Earth or come back to it with some speed."""
 
-from typing import Annotated, ClassVar, Literal, final
+from typing import Annotated, ClassVar, Final, Literal, final
 
 import msgspec
 import numpy as np
@@ -9,7 +9,14 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from feasibility.constants import AU, DAY_S, MU_SUN, mjd_to_mjd2000
-from feasibility.dataset.samplers.draws import Columns, Draw, check_ranges, collect, log_uniform
+from feasibility.dataset.samplers.draws import (
+    Columns,
+    Draw,
+    check_ranges,
+    collect,
+    log_uniform,
+    rayleigh_orbits,
+)
 from feasibility.dataset.samplers.impulsive import ImpulsiveGrid
 from feasibility.legs import Legs, Spacecraft
 from feasibility.orbits import Catalogue, classical_to_cartesian
@@ -18,6 +25,9 @@ from feasibility.orbits.earth import earth
 _Positive = Annotated[float, Meta(gt=0)]
 _Range = tuple[_Positive, _Positive]
 _Share = Annotated[float, Meta(ge=0, le=1)]
+
+_MOST_ECCENTRIC: Final = 0.6
+"""Larger eccentricities of drawn orbits are cut to this."""
 
 
 @final
@@ -87,8 +97,6 @@ class EarthLegs(
             m0_kg=self.m0_kg,
             dry_share=self.dry_share,
         )
-        if self.dry_share[1] > 1:
-            raise ValueError(f"dry_share = {list(self.dry_share)}, expected at most 1")
 
     def draw(
         self,
@@ -160,12 +168,8 @@ class EarthLegs(
         return {name: column[kept] for name, column in columns.items()}
 
     def _near_earth(self, rng: Generator, m: int) -> NDArray[np.float64]:
-        elements = np.empty((m, 6))
-        elements[:, 0] = AU * log_uniform(rng, self.a_au, m)
-        elements[:, 1] = np.minimum(rng.rayleigh(self.eccentricity_scale, m), _MOST_ECCENTRIC)
-        elements[:, 2] = np.radians(rng.rayleigh(self.inclination_scale_deg, m))
-        elements[:, 3:] = rng.uniform(0.0, 2.0 * np.pi, (m, 3))
+        elements = rayleigh_orbits(
+            rng, m, self.a_au, self.eccentricity_scale, self.inclination_scale_deg
+        )
+        elements[:, 1] = np.minimum(elements[:, 1], _MOST_ECCENTRIC)
         return elements
-
-
-_MOST_ECCENTRIC = 0.6
