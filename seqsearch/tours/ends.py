@@ -12,7 +12,7 @@ _ELEMENT_TOLERANCE = 1e-12
 
 
 def visited_twice(rules: TourRules, ids: Sequence[int]) -> list[int]:
-    """Return the ids that a tour visits more than once; it may end where it began, if it has to."""
+    """Return the ids that a tour visits twice; it may end where it began, if it has to."""
     closed = bool(rules.end_id == ids[0] == ids[-1] and len(ids) > 1)
     once = list(ids[:-1] if closed else ids)
     return sorted({body for body in once if once.count(body) > 1})
@@ -38,7 +38,8 @@ def check_ends(rules: TourRules, bodies: Sequence[TourBody]) -> list[Check]:
     if rules.unscored:
         known = {body.id: body for body in rules.unscored}
         off = max(
-            (_difference(body, known[body.id]) for body in bodies if body.id in known), default=0.0
+            (_difference(body, known[body.id]) for body in bodies if body.id in known),
+            default=0.0,
         )
         checks.append(
             Check(

@@ -104,7 +104,7 @@ class Tour(Record, frozen=True, kw_only=True):
 
     @property
     def visits(self) -> tuple[TourBody, ...]:
-        """The visited bodies in order; without the planet of a launch and others without a score."""
+        """The visited bodies in order, without those that do not count, like a launch planet."""
         return self.rules.visits(self.bodies)
 
     @property

@@ -133,7 +133,7 @@ class BestEndedTour:
         return FlownHops.of(problem, nodes, candidates, optimised)
 
     def _promising(self, nodes: Nodes, ways: WaysHome) -> NDArray[np.intp]:
-        """Return positions of the cheapest ways of each node, and of that of the largest margin."""
+        """Return positions of the cheapest ways of each node, and of the surest one."""
         m_dry = self._problem.spacecraft.m_dry
         log = np.nan_to_num(ways.log_margin, nan=0.0)
         spare = ways.m_final - m_dry

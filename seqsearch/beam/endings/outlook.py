@@ -6,8 +6,8 @@ from typing import Final, final
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.constants import DAY_S
 from feasibility.classifier.predictor import LegPredictor, bounded_burn
+from feasibility.constants import DAY_S
 from seqsearch.beam.endings.table import GRID_DAYS, TOFS_DAYS, WayHomeTable
 from seqsearch.core.ending import Ending
 from seqsearch.core.nodes import Nodes

@@ -18,7 +18,6 @@ from feasibility.orbits import OrbitalNeighbours
 from feasibility.runtime.cluster import shared
 from seqsearch.beam.counters import RankCounters
 from seqsearch.beam.endings.make import make_ends
-from seqsearch.beam.endings.protocol import Ends
 from seqsearch.beam.forecast import Forecast
 from seqsearch.beam.rankings.balanced import BalancedRanking
 from seqsearch.beam.rankings.protocol import Ranking
