@@ -38,6 +38,11 @@ class Ending:
         there = (self.required[:, None] == nodes.visited[:, None, :]).any(axis=2)
         return np.asarray(len(self.required) - there.sum(axis=1), dtype=np.int64)
 
+    def is_complete(self, rows: NDArray[np.intp]) -> bool:
+        """Tell whether a tour of these bodies ends where it has to, and visits what it has to."""
+        visited = bool(np.isin(self.required, rows).all())
+        return visited and self.row in (None, int(rows[-1]))
+
     def days_left(self, nodes: Nodes, t_dep_mjd2000: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return (n, d) the longest flight to the end, from each node at d epochs."""
         return days_until_end(
@@ -52,6 +57,13 @@ def ending_of(problem: Problem) -> Ending | None:
     """
     ending: Ending | None = getattr(problem, "ending", None)
     return ending
+
+
+def fixed_start(problem: Problem) -> int | None:
+    """Return the row of the only body at which tours may start, if no tour may visit it."""
+    rows = problem.start_rows()
+    alone = len(rows) == 1 and np.isin(rows[0], rows_to_avoid(problem))
+    return int(rows[0]) if alone else None
 
 
 def rows_to_avoid(problem: Problem) -> NDArray[np.intp]:
