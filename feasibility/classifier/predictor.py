@@ -128,9 +128,40 @@ def bounded_final_mass(legs: Legs, margin: NDArray[np.float64]) -> NDArray[np.fl
     (n,) float64, kg
         Not held at the dry mass. NaN where the margin is.
     """
-    beyond = np.maximum(margin - 1.0, 0.0)
-    most = legs.thrust / legs.exhaust_velocity * legs.tof_s / (1.0 + beyond)
-    least = np.minimum(legs.m0 - lambert_final_mass(legs), most)
-    a, b = _BURN
-    estimate: NDArray[np.float64] = legs.m0 - least - (most - least) / (1.0 + a * beyond**b)
+    full = legs.thrust / legs.exhaust_velocity * legs.tof_s
+    least, more = _burn(legs.m0 - lambert_final_mass(legs), full, margin)
+    estimate: NDArray[np.float64] = legs.m0 - least - more
     return estimate
+
+
+def bounded_burn(
+    impulsive_kg: NDArray[np.float64],
+    full_thrust_kg: NDArray[np.float64],
+    margin: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Estimate the propellant of legs as `bounded_final_mass` does, from what else burns it.
+
+    Parameters
+    ----------
+    impulsive_kg : (n,) float64, kg
+        Propellant of a transfer with impulses.
+    full_thrust_kg : (n,) float64, kg
+        What the engine can burn in the time of flight.
+    margin : (n,) float64
+        m*/m0; below 1 the answer is that at 1.
+    """
+    least, more = _burn(impulsive_kg, full_thrust_kg, margin)
+    return least + more
+
+
+def _burn(
+    impulsive_kg: NDArray[np.float64],
+    full_thrust_kg: NDArray[np.float64],
+    margin: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the propellant of impulses, and what comes on top of it."""
+    beyond = np.maximum(margin - 1.0, 0.0)
+    most = full_thrust_kg / (1.0 + beyond)
+    least = np.minimum(impulsive_kg, most)
+    a, b = _BURN
+    return least, (most - least) / (1.0 + a * beyond**b)

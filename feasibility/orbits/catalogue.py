@@ -4,14 +4,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from types import MappingProxyType
-from typing import Any, Final, final
+from typing import Any, Final, Self, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from feasibility.constants import DAY_S, MU_SUN
 from feasibility.errors import InputError
-from feasibility.orbits.classical import perifocal_axes
+from feasibility.orbits.classical import cartesian_to_classical, perifocal_axes
 from feasibility.orbits.spk.kernel_table import KernelTable
 from feasibility.quantities import plain_numbers
 from feasibility.runtime.text_column import TextColumn, taken_texts
@@ -116,6 +116,33 @@ class Catalogue:
         object.__setattr__(self, "source", source)
         object.__setattr__(self, "extra", MappingProxyType(columns))
         object.__setattr__(self, "ephemeris", ephemeris)
+
+    @classmethod
+    def from_states(
+        cls,
+        ids: ArrayLike,
+        names: Sequence[str],
+        t_mjd2000: ArrayLike,
+        states: ArrayLike,
+        source: str = "states",
+    ) -> Self:
+        """Return the bodies that pass through states, on the Kepler orbits that follow from them.
+
+        Parameters
+        ----------
+        ids, names, source
+            As for the class.
+        t_mjd2000 : array_like
+            (n,) epochs of the states, or one for all.
+        states : array_like
+            (n, 6), m and m/s.
+
+        Raises
+        ------
+        InputError
+            As the class; a state is not on an ellipse about the Sun.
+        """
+        return cls(ids, names, t_mjd2000, cartesian_to_classical(states), source)
 
     def __len__(self) -> int:
         return len(self.ids)
@@ -275,6 +302,42 @@ class Catalogue:
             source=self.source,
             extra={name: column[index] for name, column in self.extra.items()},
             ephemeris=None if self.ephemeris is None else self.ephemeris.select(index),
+        )
+
+    def with_bodies(self, more: "Catalogue") -> "Catalogue":
+        """Return the catalogue with the bodies of another one after its own.
+
+        Columns that one of the two lacks have no value there; the source stays.
+
+        Raises
+        ------
+        InputError
+            An id is in both, or one of them moves by kernels.
+        """
+        if self.ephemeris is not None or more.ephemeris is not None:
+            raise InputError(
+                f"{self.source} and {more.source}: bodies that move by SPK kernels, expected "
+                'Kepler orbits where bodies are added (ephemeris = "kepler")'
+            )
+        both = np.intersect1d(self.ids, more.ids)
+        if len(both):
+            raise InputError(
+                f"{more.source}: id {both[0]} is in {self.source} too, expected another one"
+            )
+        parts = (self, more)
+        columns = {name: None for part in parts for name in part.extra}
+        return Catalogue(
+            ids=np.concatenate([part.ids for part in parts]),
+            names=[*self.names, *more.names],
+            epoch_mjd2000=np.concatenate([part.epoch_mjd2000 for part in parts]),
+            elements=np.concatenate([part.elements for part in parts]),
+            source=self.source,
+            extra={
+                name: np.concatenate(
+                    [part.extra.get(name, np.full(len(part), np.nan)) for part in parts]
+                )
+                for name in columns
+            },
         )
 
     def _checked_rows(self, rows: ArrayLike) -> NDArray[np.int64]:

@@ -11,7 +11,9 @@ from feasibility.classifier.predictor import LegPredictor
 from feasibility.orbits import OrbitalNeighbours
 from feasibility.pruners import quick_check
 from seqsearch.beam.auditing import Auditor, make_auditor
-from seqsearch.beam.best_tour import BestTour
+from seqsearch.beam.best_tour import Best
+from seqsearch.beam.endings.make import make_ends
+from seqsearch.beam.endings.protocol import Ends
 from seqsearch.beam.expanders.make import make_expander
 from seqsearch.beam.expanders.protocol import Expander, ExpanderTools, MakeExpander
 from seqsearch.beam.frontiers.make import make_frontier
@@ -95,7 +97,7 @@ class Tools:
         How wide beams are.
     auditor : Auditor
         What is audited.
-    best : BestTour
+    best : Best
         Remembers the best tour.
     optimiser : LegOptimiser
         Solves legs.
@@ -108,9 +110,10 @@ class Tools:
     passes: Passes
     pacing: Pacing
     auditor: Auditor
-    best: BestTour
+    best: Best
     optimiser: LegOptimiser
     rng: np.random.Generator
+    _ends: Ends
     _neighbours: OrbitalNeighbours
     _pruner: AllOf
     _predictor: LegPredictor | None
@@ -128,6 +131,7 @@ class Tools:
         guide = guide_to(state.guide)
         settings = guide.settings(state.settings)
         ranking = self._own.ranking or make_ranking(settings, self._predictor, self._neighbours)
+        ranking = self._ends.ranking(ranking)
         tools = ExpanderTools(
             self.problem,
             self._neighbours,
@@ -140,7 +144,7 @@ class Tools:
         return Beam(
             guide,
             own.expander(tools) if own.expander else make_expander(tools, self._predictor, guide),
-            (own.frontier or make_frontier)(settings, self.problem, ranking),
+            self._ends.frontier((own.frontier or make_frontier)(settings, self.problem, ranking)),
         )
 
 
@@ -174,7 +178,9 @@ def assemble(
     neighbours = OrbitalNeighbours(
         problem.catalogue, reference_tof_days=settings.reference_tof_days
     )
-    best = BestTour(problem, settings)
+    ends = make_ends(problem, predictor, threads)
+    optimiser = LegOptimiser(executor)
+    best = ends.best(settings, optimiser, budget)
     scouting: Scouting = NoScouting()
     if predictor is not None and own.none and _scouts_fit(problem, settings, timed=timed):
         scouts = Scouts(problem, predictor, settings, executor)
@@ -196,8 +202,9 @@ def assemble(
         pacing,
         make_auditor(settings.audit.per_rank, pruner, audit_predictor or predictor, pacing, rng),
         best,
-        LegOptimiser(executor),
+        optimiser,
         rng,
+        ends,
         neighbours,
         pruner,
         predictor,

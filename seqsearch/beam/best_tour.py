@@ -1,6 +1,6 @@
 """`BestTour`: remembers the node that ends the best tour so far."""
 
-from typing import final
+from typing import Protocol, final
 
 import numpy as np
 
@@ -10,9 +10,17 @@ from seqsearch.core.problem import Problem
 from seqsearch.settings import SearchSettings
 
 
+class Best(Protocol):
+    """Remembers the best tour of a search."""
+
+    def note(self, nodes: Nodes, state: SearchState) -> None:
+        """Put the best of some nodes in the tree into the state, if it is better than before."""
+        ...
+
+
 @final
 class BestTour:
-    """Compares new nodes with the best one so far.
+    """Compares new nodes with the best one so far; a `Best`.
 
     Passes may rank differently; which of two tours is better does not depend on it.
 

@@ -6,7 +6,7 @@ from typing import final
 
 import numpy as np
 
-from seqsearch.beam.best_tour import BestTour
+from seqsearch.beam.best_tour import Best
 from seqsearch.beam.pacing import Pacing
 from seqsearch.beam.scouting.generations import Scouting
 from seqsearch.beam.scouting.guide import starts_of
@@ -33,7 +33,7 @@ class Passes:
         Looks for itineraries before each.
     starts : Starts
         Chooses start nodes where there are no itineraries.
-    best : BestTour
+    best : Best
         Looks at the start nodes.
     budget : Budget
         Ends the search.
@@ -49,7 +49,7 @@ class Passes:
         pacing: Pacing,
         scouting: Scouting,
         starts: Starts,
-        best: BestTour,
+        best: Best,
         budget: Budget,
         rng: np.random.Generator,
     ) -> None:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from feasibility.arrays import StructOfArrays
 from feasibility.orbits import OrbitalNeighbours
+from seqsearch.core.ending import ending_of
 from seqsearch.core.hops import Hops
 from seqsearch.core.nodes import Nodes
 from seqsearch.core.problem import Problem
@@ -91,12 +92,23 @@ def near_pairs(
         `departure_delays_days`; flights shorter than `tof_days_min` are not worth a pair.
     """
     here = nodes.take(block)
-    near = neighbours.query(here.row, here.t_ready_mjd2000, n_near)
+    near = _with_required(problem, neighbours.query(here.row, here.t_ready_mjd2000, n_near))
     departure = here.t_ready_mjd2000[:, None] + np.asarray(settings.departure_delays_days)
     left = problem.days_left(here, departure)
     allowed = problem.may_visit(here, near)[:, :, None] & (left >= settings.tof_days_min)[:, None]
     i, j, d = np.nonzero(allowed)
     return Pairs(block[i], near[i, j], departure[i, d], left[i, d])
+
+
+def _with_required(problem: Problem, near: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Return targets (n, t) with the bodies that a tour has to visit, wherever they are."""
+    ending = ending_of(problem)
+    if ending is None or len(ending.required) == 0:
+        return near
+    required = np.broadcast_to(ending.required, (len(near), len(ending.required)))
+    twice = (required[:, :, None] == near[:, None, :]).any(axis=2)
+    # A target of no body at all: no rule allows the body that a node is at.
+    return np.column_stack([near, np.where(twice, -1, required)])
 
 
 def on_grid(

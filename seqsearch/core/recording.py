@@ -31,8 +31,8 @@ def record_tour(
     flown = tree.legs_to(node)
     last = tree.node(node)
     rows = [flown[0].dep_row if flown else int(last["row"])]
-    rows += [leg.arr_row for leg in flown if leg.arr_row != leg.dep_row]
     flown += closing
+    rows += [leg.arr_row for leg in flown if leg.arr_row != leg.dep_row]
     bodies = tuple(tour_body(problem.catalogue, row) for row in rows)
     legs = tuple(_leg(problem, leg) for leg in flown)
     return Tour(
@@ -40,7 +40,7 @@ def record_tour(
         t_start_mjd2000=flown[0].t_dep_mjd2000 if flown else float(last["t_mjd2000"]),
         bodies=bodies,
         legs=legs,
-        score=rules.score.score(bodies if rules.start_counts else bodies[1:], legs),
+        score=rules.score.score(rules.visits(bodies), legs),
     )
 
 

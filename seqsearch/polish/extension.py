@@ -23,6 +23,7 @@ from feasibility.classifier.predictor import LegPredictor
 from feasibility.constants import DAY_S
 from feasibility.orbits import OrbitalNeighbours
 from feasibility.orbits.lambert import lambert_delta_v
+from seqsearch.core.ending import ending_of, fixed_start, rows_to_avoid
 from seqsearch.core.problem import Problem
 from seqsearch.polish.flight import Flight
 from seqsearch.polish.itinerary import Itinerary
@@ -45,6 +46,9 @@ _THRUST_SHARE: Final = 0.8
 _BUCKET_DAYS: Final = 60.0
 """Wide buckets: an extension sees each epoch once, and a tree of all bodies costs 20 ms."""
 
+_TIES_DAYS: Final = np.geomspace(50.0, 480.0, 16)
+"""Flight times that are tried to a fixed end, and from a fixed start."""
+
 _MAX_PER_BODY: Final = 2
 _LARGEST_OVERLOAD: Final = 0.5
 
@@ -59,7 +63,8 @@ class Extension:
     first, last : int
         Positions of the first and the last body that are kept.
     before, after : int
-        New bodies before and after; one of the two is zero.
+        New bodies before and after; one of the two is zero. A fixed start or end that is not
+        kept comes on top.
     """
 
     first: int
@@ -163,6 +168,10 @@ class Extender:
             reference_tof_days=self._settings.reference_tof_days,
             bucket_days=_BUCKET_DAYS,
         )
+        ending = ending_of(problem)
+        self._end = None if ending is None else ending.row
+        self._start = fixed_start(problem)
+        self._avoid = rows_to_avoid(problem)
 
     def extend(self, flight: Flight, extension: Extension, *, avoid: _Index) -> list[Itinerary]:
         """Return the kept part with new bodies, the most promising itineraries first.
@@ -178,14 +187,17 @@ class Extender:
         """
         base = flight.itinerary
         kept = base.part(extension.first, extension.last)
-        avoid = np.union1d(kept.rows, avoid)
-        backward = extension.before > 0
+        avoid = np.union1d(np.union1d(kept.rows, avoid), self._avoid)
+        backward = extension.first > 0 or extension.before > 0
         steps = extension.before if backward else extension.after
         nodes = self._begin(flight, extension, backward)
         for step in range(steps):
             if len(nodes.clock):
-                is_start = backward and step == steps - 1
+                is_start = backward and step == steps - 1 and self._start is None
                 nodes = self._extend(nodes, avoid, backward, is_start)
+        fixed = self._start if backward else self._end
+        if fixed is not None and kept.rows[0 if backward else -1] != fixed and len(nodes.clock):
+            nodes = self._tied(nodes, fixed, backward)
         if not len(nodes.clock):
             return []
         best = np.argsort(self._cost(nodes, backward), kind="stable")[: self._settings.results]
@@ -196,7 +208,7 @@ class Extender:
         if backward:
             burn = (flight.mass[0] - flight.mass[-1]) / len(base)
             body = extension.first
-            more = extension.before - body
+            more = extension.before - body + (self._start is not None)
             mass = flight.mass[body] - more * burn
             departure = base.t_dep_mjd2000[body] if body < len(base) else base.t_arr_mjd2000[-1]
             clock = departure - problem.min_stay_days
@@ -260,6 +272,32 @@ class Extender:
             nodes.mass[parent] + burnt if backward else final,
         )
         return found.take(_diverse(self._cost(found, backward), target, settings.width))
+
+    def _tied(self, nodes: _Nodes, row: int, backward: bool) -> _Nodes:
+        """Return n nodes with the leg to the fixed end, or from the fixed start.
+
+        The shortest that can be flown, or else the one that is nearest to it: retiming may
+        find time for it.
+        """
+        n, k = len(nodes.clock), len(_TIES_DAYS)
+        parent, tofs = np.repeat(np.arange(n), k), np.tile(_TIES_DAYS, n)
+        target = np.full(n * k, row, dtype=np.intp)
+        legs = self._legs(nodes, parent, target, tofs, backward)
+        margin = np.nan_to_num(self._predictor.margin(legs), nan=1e-9).reshape(n, k)
+        flyable = margin >= 1.0 + _MARGIN
+        best = np.where(flyable.any(axis=1), flyable.argmax(axis=1), margin.argmax(axis=1))
+        tof = _TIES_DAYS[best]
+        legs = legs.take(np.arange(n) * k + best)
+        final = np.nan_to_num(self._predictor.final_mass(legs), nan=0.0)
+        departure = nodes.clock - tof if backward else nodes.clock
+        burnt = legs.m0 - final
+        return _Nodes(
+            np.column_stack([nodes.rows, target[:n]]),
+            np.column_stack([nodes.t_dep, departure]),
+            np.column_stack([nodes.tof, tof]),
+            departure if backward else nodes.clock + tof,
+            nodes.mass + burnt if backward else final,
+        )
 
     def _cost(self, nodes: _Nodes, backward: bool) -> _Array:
         """Return (n,) the days that the extension takes, propellant included, plus a constant."""

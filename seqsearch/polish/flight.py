@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from feasibility import Legs, LegSolutions, optimise
 from feasibility.sims_flanagan import solve_max_initial_mass
+from seqsearch.core.ending import ending_of
 from seqsearch.core.problem import Problem
 from seqsearch.core.recording import record_tour
 from seqsearch.core.tree import FlownLeg, SearchTree
@@ -74,6 +75,9 @@ class Flight:
         itinerary = self.itinerary
         stays = itinerary.t_dep_mjd2000[1:] - itinerary.t_arr_mjd2000[:-1]
         earliest, latest = problem.first_departure_mjd2000
+        ending = ending_of(problem)
+        if ending is not None and not ending.is_complete(itinerary.rows):
+            return False
         return bool(
             (self.mass[:-1] <= self.m_star).all()
             and self.mass[-1] >= problem.spacecraft.m_dry

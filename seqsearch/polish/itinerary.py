@@ -1,13 +1,16 @@
 """`Itinerary`: which bodies in which order, and when; nothing about how the legs are flown."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Self, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from feasibility import Legs
+from feasibility.classifier.predictor import LegPredictor
+from seqsearch.core.ending import Ending
 from seqsearch.core.problem import Problem
+from seqsearch.core.way_home import SHORTEST_DAYS, ways_home
 from seqsearch.tours.tour import Tour
 
 
@@ -35,7 +38,7 @@ class Itinerary:
 
     @property
     def n_asteroids(self) -> int:
-        """Number of bodies, the start included."""
+        """Number of bodies, start and end included, whether they count or not."""
         return len(self.rows)
 
     @property
@@ -86,6 +89,35 @@ class Itinerary:
             np.append(self.rows, row),
             np.append(self.t_dep_mjd2000, t_dep_mjd2000),
             np.append(self.tof_days, tof_days),
+        )
+
+    def ended(
+        self, problem: Problem, ending: Ending, predictor: LegPredictor, mass: float
+    ) -> Self:
+        """Return the itinerary with a leg to the end of its tours, if it is not there yet.
+
+        The leg is the one of the predictor's that arrives first, or that is nearest to being
+        flyable. `mass` in kg is what is left after the last leg.
+        """
+        if ending.row is None or self.rows[-1] == ending.row:
+            return self
+        node = replace(
+            problem.start_nodes(self.rows[-1:], self.t_arr_mjd2000[-1:]),
+            depth=np.ones(1, dtype=np.int64),
+            visited=self.rows[None, -2:],
+            t_ready_mjd2000=self.t_arr_mjd2000[-1:] + problem.min_stay_days,
+            t_first_mjd2000=self.t_dep_mjd2000[:1],
+            mass=np.array([mass]),
+        )
+        ways = ways_home(problem, ending, node, predictor)
+        if len(ways) == 0:
+            departure = float(node.t_ready_mjd2000[0])
+            return self.appended(ending.row, departure, SHORTEST_DAYS)
+        log = np.nan_to_num(ways.log_margin, nan=0.0)
+        cost = np.where(log >= 0.0, ways.t_dep_mjd2000 + ways.tof_days, 1e9 - log)
+        best = int(np.argmin(cost))
+        return self.appended(
+            ending.row, float(ways.t_dep_mjd2000[best]), float(ways.tof_days[best])
         )
 
     def part(self, first: int, last: int) -> Self:

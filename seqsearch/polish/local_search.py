@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from feasibility import InputError
 from feasibility.classifier.predictor import LegPredictor
 from feasibility.runtime.cluster import shared
+from seqsearch.core.ending import ending_of, fixed_start
 from seqsearch.core.problem import Problem
 from seqsearch.deadline import Deadline
 from seqsearch.polish.extension import Extender, Extension, ExtensionSettings
@@ -202,11 +203,7 @@ class _Move:
     avoid: NDArray[np.intp]
     settings: ExtensionSettings
 
-    @property
-    def grows(self) -> bool:
-        kept = self.extension.last - self.extension.first + 1
-        new = self.extension.before + self.extension.after
-        return kept + new > self.origin.flight.itinerary.n_asteroids
+    grows: bool
 
 
 @final
@@ -263,6 +260,11 @@ class _Polish:
         on_step: Callable[[PolishStep, Tour], None] | None,
     ) -> None:
         self._problem = problem
+        self._ending = ending_of(problem)
+        self._fixed = (
+            int(fixed_start(problem) is not None),
+            int(self._ending is not None and self._ending.row is not None),
+        )
         self._context = _Context(problem, predictor)
         self._settings = settings
         self._deadline = deadline
@@ -280,7 +282,7 @@ class _Polish:
         *,
         endless: bool,
     ) -> PolishResult:
-        self._best = max(tours, key=lambda tour: (tour.n_asteroids, -tour.duration_days))
+        self._best = max(tours, key=lambda tour: (self._length(tour), -tour.duration_days))
         self._note("as found", self._best)
         stopped = "complete"
         rounds = 0
@@ -304,11 +306,22 @@ class _Polish:
             stopped = "time limit"
         return PolishResult(self._best, tuple(self._steps), self._moves, stopped)
 
+    def _length(self, tour: Tour) -> int:
+        """Return the number of bodies of a tour, 0 where it does not end where it has to."""
+        if self._ending is None or not tour.legs:
+            return len(tour.bodies)
+        rows = Itinerary.from_tour(self._problem, tour).rows
+        return len(rows) if self._ending.is_complete(rows) else 0
+
     def _retime_given(self, tours: list[Tour]) -> None:
-        for tour in sorted(tours, key=lambda tour: (-tour.n_asteroids, tour.duration_days)):
+        for tour in sorted(tours, key=lambda tour: (-len(tour.bodies), tour.duration_days)):
             if not tour.legs or self._deadline.passed():
                 continue
             itinerary = Itinerary.from_tour(self._problem, tour)
+            if self._ending is not None:
+                itinerary = itinerary.ended(
+                    self._problem, self._ending, self._context.predictor, tour.m_final_kg
+                )
             found = retime(self._problem, itinerary, max_iterations=_THOROUGH_ITERATIONS)
             if found is not None:
                 self._keep(found, "retimed")
@@ -336,6 +349,8 @@ class _Polish:
     def _keep(self, found: Retimed, action: str) -> None:
         """Put a tour into the pool of its length, and note it if it is the best that fits."""
         flight = found.flight
+        if self._ending is not None and not self._ending.is_complete(flight.itinerary.rows):
+            return
         pool = self._pools.setdefault(flight.itinerary.n_asteroids, [])
         same = [
             k
@@ -350,7 +365,7 @@ class _Polish:
         pool.sort(key=lambda retimed: retimed.merit_days)
         del pool[self._settings.pool :]
         days = flight.itinerary.duration_days
-        best = (self._best.n_asteroids, -self._best.duration_days + _NOTEWORTHY_DAYS)
+        best = (self._length(self._best), -self._best.duration_days + _NOTEWORTHY_DAYS)
         if flight.keeps_rules(self._problem) and (flight.itinerary.n_asteroids, -days) > best:
             self._note(action, flight.to_tour(self._problem))
 
@@ -371,27 +386,29 @@ class _Polish:
     def _draw(self, rng: np.random.Generator) -> _Move:
         """Draw a tour from the pools and what to rebuild of it."""
         settings = self._settings
-        fits = max(
-            (k for k in self._pools if k <= self._best.n_asteroids), default=min(self._pools)
-        )
+        longest = self._length(self._best)
+        fits = max((k for k in self._pools if k <= longest), default=min(self._pools))
         too_long = [k for k in self._pools if k > fits]
         grow = rng.random() < settings.growth_share
         length = max(too_long) if too_long and not grow and rng.random() < 0.5 else fits
         pool = self._pools[length]
         origin = pool[min(int(rng.exponential(len(pool) / 3.0)), len(pool) - 1)]
         rows = origin.flight.itinerary.rows
+        # Bodies at which tours have to start or end are not replaced.
+        first, last = self._fixed[0], length - 1 - self._fixed[1]
+        free = last - first + 1
         # A tour grows at an end that is mostly its own.
         n_new = min(
-            int(rng.geometric(0.4)) - 1 if grow else int(rng.integers(1, length)), length - 1
+            int(rng.geometric(0.4)) - 1 if grow else int(rng.integers(1, max(free, 2))), free - 1
         )
         at_start = rng.random() < 0.35
         more = int(grow)
         if at_start:
-            extension = Extension(n_new, length - 1, n_new + more, 0)
-            removed = rows[:n_new]
+            extension = Extension(first + n_new, length - 1, n_new + more, 0)
+            removed = rows[first : first + n_new]
         else:
-            extension = Extension(0, length - 1 - n_new, 0, n_new + more)
-            removed = rows[length - n_new :]
+            extension = Extension(0, last - n_new, 0, n_new + more)
+            removed = rows[last + 1 - n_new : last + 1]
         avoid = removed[rng.random(len(removed)) < settings.avoid_share]
         base = settings.extension
         varied = ExtensionSettings(
@@ -403,4 +420,4 @@ class _Polish:
             reference_tof_days=base.reference_tof_days * rng.uniform(0.75, 1.35),
             propellant_days_per_kg=base.propellant_days_per_kg * 2.0 ** rng.uniform(-1.5, 0.5),
         )
-        return _Move(origin, extension, avoid, varied)
+        return _Move(origin, extension, avoid, varied, grow)

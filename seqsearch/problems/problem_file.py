@@ -17,6 +17,7 @@ from feasibility.orbits.selection import selected_rows
 from feasibility.orbits.spk.files import is_kernel
 from feasibility.runtime.toml_file import convert_table, parse_toml, read_toml_text
 from seqsearch.core.problem import Problem
+from seqsearch.problems.extra_bodies import BodyTable, extra_bodies
 from seqsearch.problems.registry import ProblemPlugin, builtin_problems, plugins
 from seqsearch.problems.rendezvous import RendezvousProblem
 from seqsearch.settings import SearchSettings
@@ -71,7 +72,8 @@ class SpacecraftTable(_Table, frozen=True, kw_only=True):
 class MissionTable(_Table, frozen=True, kw_only=True):
     """Table ``[mission]``; epochs in MJD, or as dates such as ``2030-01-01``.
 
-    With a `sequence` these bodies alone are visited, in this order.
+    With a `sequence` these bodies alone are visited, in this order. With an `end_id` tours end
+    there, and they visit all that `must_visit` names.
     """
 
     first_departure_mjd: tuple[float, float]
@@ -79,6 +81,8 @@ class MissionTable(_Table, frozen=True, kw_only=True):
     min_stay_days: float = 0.0
     start_ids: tuple[int, ...] = ()
     sequence: tuple[int, ...] = ()
+    end_id: int | None = None
+    must_visit: tuple[int, ...] = ()
 
 
 @final
@@ -116,6 +120,7 @@ class Config(_Table, frozen=True, kw_only=True):
     spacecraft: SpacecraftTable
     mission: MissionTable
     catalogue: CatalogueTable = msgspec.field(default_factory=CatalogueTable)
+    bodies: tuple[BodyTable, ...] = ()
     fleet: FleetTable = msgspec.field(default_factory=FleetTable)
     search: SearchSettings = msgspec.field(default_factory=SearchSettings)
 
@@ -196,6 +201,9 @@ def _decode(text: str, label: str) -> Config:
             mjd_of(epoch, f"{label}: mission.first_departure_mjd")
             for epoch in mission["first_departure_mjd"]
         ]
+    for number, body in enumerate(plain.get("bodies") or (), 1):
+        if isinstance(body, dict) and "epoch_mjd" in body:
+            body["epoch_mjd"] = mjd_of(body["epoch_mjd"], f"{label}: bodies[{number}].epoch_mjd")
     return convert_table(plain, _whole(), label)
 
 
@@ -272,9 +280,11 @@ def build_problem(config: Config, catalogue: Catalogue | None = None) -> Problem
     mission = config.mission
     earliest, latest = mission.first_departure_mjd
     bodies = _without_excluded(catalogue or whole_catalogue(config), config)
+    if config.bodies:
+        bodies = bodies.with_bodies(extra_bodies(config.bodies, config.problem.name))
     if mission.sequence:
         # The others play no part, and most of the work would be to look at them.
-        bodies = bodies.select(np.unique(bodies.rows_of(np.asarray(mission.sequence))))
+        bodies = bodies.select(np.unique(bodies.rows_of(np.asarray(_on_the_way(config)))))
     base = RendezvousProblem(
         name=config.problem.name,
         catalogue=bodies,
@@ -285,6 +295,9 @@ def build_problem(config: Config, catalogue: Catalogue | None = None) -> Problem
         min_stay_days=mission.min_stay_days,
         start_ids=_start_ids(config),
         sequence=mission.sequence,
+        end_id=mission.end_id,
+        must_visit=mission.must_visit,
+        unscored_ids=tuple(body.id for body in config.bodies if not body.scored),
     )
     own = [
         (plugin, rules) for plugin in plugins().values() if (rules := _rules_of(config, plugin))
@@ -294,10 +307,16 @@ def build_problem(config: Config, catalogue: Catalogue | None = None) -> Problem
             f"problem {config.problem.name}: tables [{own[0][0].name}] and [{own[1][0].name}], "
             "expected the rules of one problem"
         )
-    if own and mission.sequence:
+    given = {
+        "a sequence": bool(mission.sequence),
+        "an end_id": mission.end_id is not None,
+        "must_visit": bool(mission.must_visit),
+        "[[bodies]]": bool(config.bodies),
+    }
+    for what in (what for what, there in given.items() if own and there):
         raise InputError(
-            f"problem {config.problem.name}: a sequence and a table [{own[0][0].name}], expected "
-            "a sequence only in tours of rendezvous alone"
+            f"problem {config.problem.name}: {what} and a table [{own[0][0].name}], expected "
+            f"{what} only in tours of rendezvous alone"
         )
     for plugin, rules in own:
         if plugin.build is not None:
@@ -309,6 +328,15 @@ def build_problem(config: Config, catalogue: Catalogue | None = None) -> Problem
                 )
             return problem
     return base
+
+
+def _on_the_way(config: Config) -> list[int]:
+    """Return the ids of the bodies of a sequence, and of those at which it may start and end."""
+    mission = config.mission
+    end = () if mission.end_id is None else (mission.end_id,)
+    unscored = {body.id for body in config.bodies if not body.scored}
+    starts = [body for body in mission.start_ids if body in unscored]
+    return list(dict.fromkeys([*mission.sequence, *starts, *end]))
 
 
 def _rules_of(config: Config, plugin: ProblemPlugin) -> object:
@@ -419,9 +447,10 @@ def _kernel_bodies(config: Config, path: Path) -> Catalogue:
 def to_toml(config: Config) -> str:
     """Return the resolved configuration as TOML; `read_config` reads it back."""
     tables = msgspec.to_builtins(config)
-    plain = {
-        name: {key: value for key, value in table.items() if value is not None}
-        for name, table in tables.items()
-        if table is not None
-    }
-    return tomli_w.dumps(plain)
+    bodies = [_without_none(body) for body in tables.pop("bodies")]
+    plain = {name: _without_none(table) for name, table in tables.items() if table is not None}
+    return tomli_w.dumps(plain | ({"bodies": bodies} if bodies else {}))
+
+
+def _without_none(table: dict[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in table.items() if value is not None}

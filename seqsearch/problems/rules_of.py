@@ -30,7 +30,11 @@ def rules_of(config: Config, tour: Tour, catalogue: Catalogue | None = None) -> 
         A value of the problem file is out of range, or its rules need the table.
     """
     if catalogue is None:
-        catalogue = _bodies_of(tour, (*config.mission.start_ids, *config.mission.sequence))
+        mission = config.mission
+        end = () if mission.end_id is None else (mission.end_id,)
+        named = (*mission.start_ids, *mission.sequence, *mission.must_visit, *end)
+        ours = {body.id for body in config.bodies}
+        catalogue = _bodies_of(tour, tuple(body for body in named if body not in ours), ours)
         # Which bodies were excluded plays no part in the rules.
         table = msgspec.structs.replace(config.catalogue, exclude_ids=())
         config = msgspec.structs.replace(config, catalogue=table)
@@ -71,12 +75,16 @@ def _short(value: object) -> str:
     return text if len(text) <= 60 else text[:57] + "..."
 
 
-def _bodies_of(tour: Tour, named: tuple[int, ...]) -> Catalogue:
-    """Return the visited bodies as a catalogue; the first stands in for others that are named."""
+def _bodies_of(tour: Tour, named: tuple[int, ...], ours: set[int]) -> Catalogue:
+    """Return the visited bodies as a catalogue; the first stands in for others that are named.
+
+    Without those that the problem file has itself.
+    """
     bodies = {body.id: body for body in tour.visits or tour.bodies}
     first = next(iter(bodies.values()))
-    for body_id in (*named, max(bodies) + 1):
+    for body_id in (*named, max(*bodies, *ours, 0) + 1):
         bodies.setdefault(body_id, first)
+    bodies = {body_id: body for body_id, body in bodies.items() if body_id not in ours}
     return Catalogue(
         ids=list(bodies),
         names=[body.name for body in bodies.values()],

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from feasibility import Spacecraft
 from feasibility.orbits import Catalogue
 from seqsearch.core.custom_moves import CustomMoves
+from seqsearch.core.ending import Ending
 from seqsearch.core.hops import Hops
 from seqsearch.core.nodes import Nodes
 from seqsearch.core.tree import FlownLeg
@@ -74,6 +75,16 @@ class RendezvousVariant:
     def custom_moves(self) -> CustomMoves | None:
         """None: near neighbours and a range of flight times fit."""
         return self.base.custom_moves
+
+    @property
+    def ending(self) -> Ending | None:
+        """What a tour needs to be complete; None where it is after any visit."""
+        return self.base.ending
+
+    @property
+    def rows_to_avoid(self) -> NDArray[np.intp]:
+        """Rows that are not visited on the way: without a score, excluded, or the end."""
+        return self.base.rows_to_avoid
 
     def start_rows(self) -> NDArray[np.intp]:
         """Return the catalogue rows of the bodies at which a tour may start."""

@@ -72,7 +72,7 @@ def probe_paths(folder: Path) -> list[Path]:
 
 def check_disjoint(tours: list[Tour]) -> Check:
     """Check that no body is visited by two probes."""
-    bodies = [{body.id for body in tour.bodies} for tour in tours]
+    bodies = [{body.id for body in tour.visits} for tour in tours]
     shared = sorted(set().union(*(a & b for a, b in combinations(bodies, 2))))
     return Check(
         "no asteroid on two probes", not shared, str(shared) if shared else "none", "none"

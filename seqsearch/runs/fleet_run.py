@@ -60,7 +60,7 @@ def run_fleet(
     tours: list[Tour] = []
     for number in range(1, probes + 1):
         sub = folder / probe_folder(number)
-        single = _without(config, [body.id for tour in tours for body in tour.bodies])
+        single = _without(config, [body.id for tour in tours for body in tour.visits])
         share_s = None
         if limits.time_limit_s is not None:
             left_s = max(1.0, limits.time_limit_s - (time.monotonic() - begin))

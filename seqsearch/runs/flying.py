@@ -13,6 +13,7 @@ from feasibility.runtime.locks import folder_lock
 from feasibility.runtime.terminal import Level, say
 from seqsearch.beam.scouting.scout import STRETCHES
 from seqsearch.budget import Limits
+from seqsearch.core.ending import Ending, ending_of
 from seqsearch.core.problem import Problem
 from seqsearch.polish.itinerary import Itinerary
 from seqsearch.polish.retiming import retime
@@ -20,6 +21,7 @@ from seqsearch.problems.problem_file import Config, build_problem
 from seqsearch.runs.begin import begin_search
 from seqsearch.runs.polishing import polish_run
 from seqsearch.runs.run_folder import SEQUENCE, RunFolder
+from seqsearch.runs.whole_chain import whole_chain
 from seqsearch.settings import SearchSettings
 from seqsearch.tours.dates import date_of
 from seqsearch.tours.pictures.plots import plot_tour
@@ -53,7 +55,8 @@ def for_sequence(config: Config) -> Config:
         beam_width=_WIDTH,
         starts=starts,
         start_epochs=starts,
-        neighbours=len(config.mission.sequence),
+        # A start and an end that the sequence does not name are among the bodies too.
+        neighbours=len(config.mission.sequence) + (2 if config.bodies else 0),
         flight_time_stretches=STRETCHES,
         departure_delays_days=_DELAYS_DAYS,
         frontier={
@@ -99,8 +102,14 @@ def fly_run(config: Config, folder: Path, seed: int, limits: Limits) -> int:
         )
     if code != 0:
         return code
-    if len(read_tour(folder / SEQUENCE).bodies) < len(config.mission.sequence):
-        broken = _completed(build_problem(config), folder, config)
+    if not _is_whole(config, read_tour(folder / SEQUENCE)):
+        problem = build_problem(config)
+        ending = ending_of(problem)
+        broken = (
+            _completed(problem, folder, config)
+            if ending is None
+            else _ended(problem, ending, folder, config)
+        )
         if broken and (limits.time_limit_s is not None or limits.max_solves is not None):
             broken += "; the limit may have been too short to find it"
         if broken:
@@ -110,6 +119,32 @@ def fly_run(config: Config, folder: Path, seed: int, limits: Limits) -> int:
     say(tour.one_line())
     say(f"the whole sequence: {tour.summary()}")
     return 0
+
+
+def _is_whole(config: Config, tour: Tour) -> bool:
+    """Tell whether a tour visits all of the sequence, and ends where it has to."""
+    ids = [body.id for body in tour.bodies]
+    end = config.mission.end_id
+    return set(config.mission.sequence) <= set(ids) and (end is None or ids[-1] == end)
+
+
+def _ended(problem: Problem, ending: Ending, path: Path, config: Config) -> str:
+    """Fly the sequence to its end if that can be; return what it lacks, or nothing."""
+    tour = read_tour(path / SEQUENCE)
+    ids = {body.id for body in tour.bodies}
+    count = sum(body in ids for body in config.mission.sequence)
+    chain = whole_chain(
+        problem, ending, tour, config.mission.sequence, FeasibilityClassifier.load()
+    )
+    if chain.tour is None:
+        return (
+            f"flown to {count} of {len(config.mission.sequence)} and then to the end; of the "
+            f"whole sequence the best timetable has {chain.lacks}"
+        )
+    with folder_lock(path):
+        RunFolder.open(path).write_polished(chain.tour)
+        plot_tour(chain.tour, path / "tour.png")
+    return ""
 
 
 def _completed(problem: Problem, path: Path, config: Config) -> str:

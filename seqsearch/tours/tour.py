@@ -31,6 +31,14 @@ class TourRules(Record, frozen=True, kw_only=True):
     kernels : tuple of KernelFile, optional
         SPK kernels that say how the bodies move, whose ids are then NAIF's. The file says nothing
         where they move on Kepler orbits.
+    end_id : int, optional
+        Id of the body at which the tour ends; the file says nothing where that is free. It may
+        be the start, and its arrival is followed by no stay.
+    must_visit : tuple of int, optional
+        Ids of bodies that the tour has to visit.
+    unscored : tuple of TourBody, optional
+        Bodies that do not count, at which the tour may start or end: with their elements, as no
+        asteroid table has them.
     """
 
     name: str
@@ -49,6 +57,17 @@ class TourRules(Record, frozen=True, kw_only=True):
     mu_m3_s2: float = MU_SUN
     g0_m_s2: float = G0
     kernels: tuple[KernelFile, ...] | UnsetType = UNSET
+    end_id: int | UnsetType = UNSET
+    must_visit: tuple[int, ...] | UnsetType = UNSET
+    unscored: tuple[TourBody, ...] | UnsetType = UNSET
+
+    def visits(self, bodies: tuple[TourBody, ...]) -> tuple[TourBody, ...]:
+        """Return those bodies of a tour that count; the start body, if it ends there too, once."""
+        visited = bodies if self.start_counts else bodies[1:]
+        apart = {body.id for body in self.unscored or ()}
+        if self.end_id is not UNSET and len(bodies) > 1 and bodies[-1].id == bodies[0].id:
+            visited = visited[:-1]
+        return tuple(body for body in visited if body.id not in apart) if apart else visited
 
 
 @final
@@ -80,13 +99,13 @@ class Tour(Record, frozen=True, kw_only=True):
 
     @property
     def n_asteroids(self) -> int:
-        """Number of visited bodies."""
+        """Number of visited bodies that count."""
         return len(self.visits)
 
     @property
     def visits(self) -> tuple[TourBody, ...]:
-        """The visited bodies in order; without the planet of a launch."""
-        return self.bodies if self.rules.start_counts else self.bodies[1:]
+        """The visited bodies in order, without those that do not count, like a launch planet."""
+        return self.rules.visits(self.bodies)
 
     @property
     def duration_days(self) -> float:

@@ -28,6 +28,7 @@ from seqsearch.tours.checks import (
     largest,
     smallest,
 )
+from seqsearch.tours.ends import check_ends, visited_twice
 from seqsearch.tours.events.make import event_kinds
 from seqsearch.tours.model_checks import check_masses, check_thrust
 from seqsearch.tours.motion import (
@@ -193,7 +194,7 @@ def _check_order(tour: Tour) -> list[Check]:
     stops = [ids[0], *(leg.to_id for leg in tour.legs if not leg.is_fly_by)]
     places = [ids[0], *(leg.to_id for leg in tour.legs)]
     linked = chain == list(pairwise(places)) and stops == ids
-    repeated = sorted({body for body in ids if ids.count(body) > 1})
+    repeated = visited_twice(tour.rules, ids)
     start_ids = tour.rules.start_ids
     return [
         Check(
@@ -206,6 +207,7 @@ def _check_order(tour: Tour) -> list[Check]:
             str(ids[0]),
             str(list(start_ids)) if start_ids else "any",
         ),
+        *check_ends(tour.rules, tour.bodies),
     ]
 
 

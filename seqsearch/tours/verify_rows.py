@@ -27,6 +27,7 @@ from seqsearch.tours.checks import (
     largest,
     smallest,
 )
+from seqsearch.tours.ends import check_ends, visited_twice
 from seqsearch.tours.events.drop import Drop
 from seqsearch.tours.events.fly_by import FlyBy
 from seqsearch.tours.events.launch import Launch
@@ -135,8 +136,7 @@ def verify_rows(
     for event in (*rules.events, *absent):
         if event is not None:
             checks += event.checks(tour)
-    visits = stops if rules.start_counts else stops[1:]
-    score = rules.score.score(visits, legs)
+    score = rules.score.score(rules.visits(stops), legs)
     name = rules.score.name or "asteroids"
     checks.append(Check("score", True, f"{name} {score:.6g} {rules.score.unit}".rstrip(), "any"))
     return Verification(tuple(checks))
@@ -212,7 +212,7 @@ def _check_order(
         if before.phase.end != after.phase.start
     ]
     ids = [body.id for body in stops]
-    repeated = sorted({body for body in ids if ids.count(body) > 1})
+    repeated = visited_twice(rules, ids)
     allowed = rules.start_ids
     return [
         Check("phases join", not broken, ", ".join(broken) or "joined", "joined"),
@@ -223,6 +223,7 @@ def _check_order(
             flown[0].phase.start,
             str(list(allowed)) if allowed else "any",
         ),
+        *check_ends(rules, stops),
     ]
 
 

@@ -6,8 +6,10 @@ from typing import Final, final
 import numpy as np
 from numpy.typing import NDArray
 
+from seqsearch.beam.endings.protocol import Ends
 from seqsearch.beam.forecast import Forecast, PairCurves
 from seqsearch.beam.frontiers.depth import DepthFrontier
+from seqsearch.beam.frontiers.protocol import Frontier
 from seqsearch.beam.rankings.balanced import BalancedRanking
 from seqsearch.core.candidates import reached
 from seqsearch.core.nodes import Nodes
@@ -59,7 +61,7 @@ class Scouted:
 
 
 def scout(
-    problem: Problem, forecast: Forecast, starts: Nodes, settings: SearchSettings
+    problem: Problem, forecast: Forecast, ends: Ends, starts: Nodes, settings: SearchSettings
 ) -> Scouted:
     """Run a beam in which hops count as flown when the predictor says that they can be.
 
@@ -69,14 +71,17 @@ def scout(
         What to solve.
     forecast : Forecast
         Predicts the legs.
+    ends : Ends
+        Looks to the ends of tours.
     starts : Nodes
         Start nodes, at least one.
     settings : SearchSettings
         Width, caps and weights of the beam; neighbours and flight times are the scout's own.
     """
-    ranking = BalancedRanking(settings.time_weight, settings.propellant_weight)
+    ranking = ends.ranking(BalancedRanking(settings.time_weight, settings.propellant_weight))
     counts = np.zeros(3, dtype=np.int64)
-    nodes, before = _numbered(starts), starts
+    nodes = _numbered(starts)
+    ranks = [nodes]
     while True:
         here = settings.with_(
             neighbours=min(_NEIGHBOURS, settings.neighbours),
@@ -93,13 +98,15 @@ def scout(
         pairs = [survey.pairs for survey in surveys if len(survey.pairs)]
         if not pairs:
             break
-        frontier = DepthFrontier(here.frontier, problem, ranking)
+        frontier = ends.frontier(DepthFrontier(here.frontier, problem, ranking))
         children = _children(problem, forecast, nodes, pairs, frontier, here)
         if len(children) == 0:
             break
-        nodes, before = _numbered(children), nodes
-    ends = [nodes] if nodes.depth.min() == 0 else [nodes, before]
-    leaves = [_best(end, ranking.score(end, problem)) for end in ends]
+        nodes = _numbered(children)
+        ranks.append(nodes)
+    ended = (rank.take(ends.reachable(rank)) for rank in reversed(ranks))
+    last = [rank for rank in ended if len(rank)][:2] or ranks[:1]
+    leaves = [_best(rank, ranking.score(rank, problem)) for rank in last]
     return Scouted(_numbered(Nodes.concatenate(leaves), -1), *(int(count) for count in counts))
 
 
@@ -108,7 +115,7 @@ def _children(
     forecast: Forecast,
     nodes: Nodes,
     pairs: list[PairCurves],
-    frontier: DepthFrontier,
+    frontier: Frontier,
     settings: SearchSettings,
 ) -> Nodes:
     """Return the nodes of the next rank: chosen by quick answers first, then by good ones."""

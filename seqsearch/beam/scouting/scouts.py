@@ -17,12 +17,15 @@ from feasibility.classifier.predictor import LegPredictor
 from feasibility.orbits import OrbitalNeighbours
 from feasibility.runtime.cluster import shared
 from seqsearch.beam.counters import RankCounters
+from seqsearch.beam.endings.make import make_ends
 from seqsearch.beam.forecast import Forecast
 from seqsearch.beam.rankings.balanced import BalancedRanking
+from seqsearch.beam.rankings.protocol import Ranking
 from seqsearch.beam.scouting.pool import Pool
 from seqsearch.beam.scouting.regions import starts_near, window_part
 from seqsearch.beam.scouting.scout import Scouted, scout
 from seqsearch.beam.starts import dense_starts
+from seqsearch.core.ending import ending_of
 from seqsearch.core.nodes import Nodes
 from seqsearch.core.problem import Problem
 from seqsearch.settings import SearchSettings
@@ -32,6 +35,9 @@ _SLICE_DAYS: Final = 300.0
 
 _SLICE_EPOCHS: Final = 6
 """Epochs at which a slice is looked at."""
+
+_MOST_EPOCHS: Final = 60
+"""The same where tours start at one body and have to end somewhere."""
 
 _EXPLORING: Final = 0.4
 """Share of the scouts that explore."""
@@ -127,7 +133,9 @@ class Scouts:
         Pool
             With what they found.
         """
-        ranking = BalancedRanking(settings.time_weight, settings.propellant_weight)
+        ranking = self._tools.ends.ranking(
+            BalancedRanking(settings.time_weight, settings.propellant_weight)
+        )
         pool, orders = self._orders(pool, settings, count, rng, ranking)
         found = []
         for order, scouted in zip(orders, self._send(orders), strict=True):
@@ -143,7 +151,7 @@ class Scouts:
         settings: SearchSettings,
         count: int,
         rng: np.random.Generator,
-        ranking: BalancedRanking,
+        ranking: Ranking,
     ) -> tuple[Pool, list[_Order]]:
         explorers = count
         if len(pool) and pool.niches().max() + 1 >= _NICHES:
@@ -165,7 +173,7 @@ class Scouts:
             if k < explorers:
                 changes |= {
                     "starts": _STARTS * settings.scouts.width,
-                    "start_epochs": _SLICE_EPOCHS,
+                    "start_epochs": self._slice_epochs(settings),
                 }
                 window = window_part(self._problem, parts[k], slices)
                 orders.append(_Order(seed, settings.with_(**changes), window, None))
@@ -177,6 +185,13 @@ class Scouts:
                 near, times = pool.nodes.take(row), int(pool.times_picked[row[0]])
                 orders.append(_Order(seed, settings.with_(**changes), None, near, times))
         return pool, orders
+
+    def _slice_epochs(self, settings: SearchSettings) -> int:
+        """Return at how many epochs a slice is looked at: at more where few bodies are starts."""
+        if ending_of(self._problem) is None:
+            return _SLICE_EPOCHS
+        wanted = _STARTS * settings.scouts.width / len(self._problem.start_rows())
+        return int(np.clip(wanted, _SLICE_EPOCHS, _MOST_EPOCHS))
 
     def _send(self, orders: list[_Order]) -> list[Scouted]:
         if self._executor is None:
@@ -198,6 +213,7 @@ class _Tools:
             problem.catalogue, reference_tof_days=reference_tof_days
         )
         self.forecast = Forecast(problem, predictor, self.neighbours)
+        self.ends = make_ends(problem, predictor)
 
 
 def _scouted(tools: _Tools, order: _Order) -> Scouted:
@@ -208,7 +224,8 @@ def _scouted(tools: _Tools, order: _Order) -> Scouted:
         starts = starts_near(tools.problem, tools.neighbours, order.near, count, rng)
     else:
         starts = dense_starts(tools.problem, tools.neighbours, settings, rng, order.window)
-    return scout(tools.problem, tools.forecast, tools.problem.start_nodes(*starts), settings)
+    nodes = tools.problem.start_nodes(*starts)
+    return scout(tools.problem, tools.forecast, tools.ends, nodes, settings)
 
 
 @functools.lru_cache(maxsize=1)

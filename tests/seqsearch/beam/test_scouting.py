@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from feasibility.orbits import OrbitalNeighbours
 from seqsearch import search
 from seqsearch.beam.counters import RankCounters
+from seqsearch.beam.endings.free import FreeEnds
 from seqsearch.beam.forecast import Forecast
 from seqsearch.beam.rankings.time_propellant import TimePropellantRanking
 from seqsearch.beam.scouting.guide import ItineraryGuide, starts_of
@@ -69,7 +70,9 @@ def test_itineraries_obey_the_rules_of_the_problem(problem, neighbours):
     starts = problem.start_nodes(
         *dense_starts(problem, neighbours, settings, np.random.default_rng(1))
     )
-    scouted = scout(problem, Forecast(problem, Toy(), neighbours), starts, settings)
+    scouted = scout(
+        problem, Forecast(problem, Toy(), neighbours), FreeEnds(problem), starts, settings
+    )
     leaves = scouted.leaves
     assert leaves.depth.max() >= 2
     assert set(np.unique(leaves.depth)) <= {leaves.depth.max(), leaves.depth.max() - 1}
