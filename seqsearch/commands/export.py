@@ -23,7 +23,10 @@ with its continuous thrust, any other with its impulses, and the file says which
   csv       table of all rows
   json      bodies, legs and rows, by a published JSON schema
   graphml   the search tree; a run folder only
+  carrier   M.TXT, P1.TXT and so on into the folder PATH: a carrier and its refined craft
 """
+
+_CARRIER: Final = "carrier"
 
 
 def add_parser(commands: "Commands") -> None:
@@ -51,11 +54,28 @@ def _export(options: argparse.Namespace) -> int:
         nodes = write_graphml(path, out, options.catalogue)
         say(f"{out}: {nodes} nodes", Level.PROGRESS)
         return 0
+    if options.to == _CARRIER:
+        return _carrier(path, out)
     if options.to not in exporters():
-        known = ", ".join([*exporters(), GRAPHML])
+        known = ", ".join([*exporters(), GRAPHML, _CARRIER])
         raise InputError(f"--to {options.to}: no such format, expected one of {known}")
     flight = flight_of(path)
     exporters()[options.to].write(flight, out)
     model = "continuous thrust" if flight.trajectory.continuous else "impulses, not refined"
     say(f"{out}: {len(flight.tour.legs)} legs, {model}", Level.PROGRESS)
+    return 0
+
+
+def _carrier(path: Path, out: Path) -> int:
+    """Write the files of a carrier's run."""
+    from seqsearch.runs.carriers import carrier_run
+    from seqsearch.tours.carrier.rows import write_carrier_rows
+
+    carrier, craft = carrier_run(path)
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{out}: no folder to write to ({error.strerror})") from None
+    write_carrier_rows(out, carrier, craft)
+    say(f"{out}: {len(carrier.events)} events, {len(craft)} craft", Level.PROGRESS)
     return 0

@@ -29,6 +29,9 @@ else 1.
 With --continuous the rows of a refined tour are checked instead, as they are handed in: the
 motion from each row to the next and through all rows of a phase, thrust, mass flow, and the
 bodies met, by the rules of the problem and the elements of the asteroid table.
+
+A folder with M.TXT holds a carrier and its craft, P1.TXT and so on. These files alone are checked,
+by the rules of --problem and with the asteroid table of --catalogue.
 """
 
 
@@ -40,7 +43,9 @@ def add_parser(commands: "Commands") -> None:
         description=_DESCRIPTION,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    verify.add_argument("path", metavar="RUN", help="run folder, or a sequence.json")
+    verify.add_argument(
+        "path", metavar="RUN", help="run folder, sequence.json, or folder with M.TXT"
+    )
     verify.add_argument(
         "--problem",
         metavar="NAME|FILE",
@@ -74,11 +79,15 @@ def add_parser(commands: "Commands") -> None:
 
 
 def _verify(options: argparse.Namespace) -> int:
+    from seqsearch.commands.verify_carrier import verify_files
     from seqsearch.runs.fleet import check_disjoint, is_fleet, probe_paths
+    from seqsearch.tours.carrier.reading import is_carrier
     from seqsearch.tours.checks import Verification
     from seqsearch.tours.tour_files import read_tour
 
     path = Path(options.path)
+    if is_carrier(path):
+        return _concluded([verify_files(path, options.problem, options.catalogue)], options.json)
     if options.continuous:
         return _verify_continuous(options)
     fleet = is_fleet(path)

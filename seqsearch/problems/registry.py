@@ -3,12 +3,13 @@
 A plug-in is a package with problem files (``*.toml``). If TOML alone cannot say its rules, its
 ``__init__`` also offers ``RULES``, a frozen `msgspec.Struct`, and ``build(base, rules)``, which
 returns a `Problem`. The name of the entry point is then the name of the table in problem files
-that has the rules. Importing the package should cost little: all plug-ins are imported whenever
-a problem file is read.
+that has the rules. If a carrier with craft flies one of its problems, ``CARRIERS`` has a function
+for the name of that problem, which returns its `CarrierRules`. Importing the package should cost
+little: all plug-ins are imported whenever a problem file is read.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from importlib import metadata, resources
 from typing import Any, Final, final
@@ -18,6 +19,7 @@ import msgspec
 from feasibility import InputError
 from seqsearch.core.problem import Problem
 from seqsearch.problems.rendezvous import RendezvousProblem
+from seqsearch.tours.carrier.records import CarrierRules
 
 ENTRY_POINTS: Final = "seqsearch.problems"
 """Group of the entry points."""
@@ -41,12 +43,15 @@ class ProblemPlugin:
         Makes the problem.
     files : dict of str to str
         Its problem files: names of problems and TOML texts.
+    carriers : dict of str to callable
+        The rules of problems that a carrier flies, by the names of the problems.
     """
 
     name: str
     rules: type[Any] | None
     build: Build | None
     files: dict[str, str]
+    carriers: dict[str, Callable[[], CarrierRules]] = field(default_factory=dict)
 
 
 @cache
@@ -87,6 +92,24 @@ def builtin_problems() -> dict[str, str]:
     return dict(sorted(texts.items()))
 
 
+def carrier_rules(name: str) -> CarrierRules:
+    """Return the rules of a problem that a carrier flies.
+
+    Raises
+    ------
+    InputError
+        As `plugins`, or no plug-in has one of that name.
+    """
+    known = {
+        name: rules for plugin in plugins().values() for name, rules in plugin.carriers.items()
+    }
+    if name not in known:
+        raise InputError(
+            f"problem {name}: not one that a carrier flies, expected {', '.join(sorted(known))}"
+        )
+    return known[name]()
+
+
 def _loaded(entry: metadata.EntryPoint) -> ProblemPlugin:
     label = f"problem plug-in {entry.name}"
     if not entry.name.isidentifier():
@@ -108,4 +131,4 @@ def _loaded(entry: metadata.EntryPoint) -> ProblemPlugin:
         raise InputError(f"{label}: {entry.value} has one of RULES and build, expected both")
     if rules is not None and not (isinstance(rules, type) and issubclass(rules, msgspec.Struct)):
         raise InputError(f"{label}: RULES of {entry.value} is no msgspec.Struct")
-    return ProblemPlugin(entry.name, rules, build, files)
+    return ProblemPlugin(entry.name, rules, build, files, dict(getattr(module, "CARRIERS", {})))

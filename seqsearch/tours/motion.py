@@ -83,13 +83,13 @@ def fly_from(leg: TourLeg, departure: NDArray[np.float64], mu: float) -> NDArray
     state[3:] += leg.dep_velocity_m_s
     t = leg.t_dep_mjd2000
     for impulse in leg.impulses:
-        state = _coast(state, (impulse.t_mjd2000 - t) * DAY_S, mu)
+        state = coast(state, (impulse.t_mjd2000 - t) * DAY_S, mu)
         state[3:] += impulse.dv_m_s
         t = impulse.t_mjd2000
-    return _coast(state, (leg.t_arr_mjd2000 - t) * DAY_S, mu)
+    return coast(state, (leg.t_arr_mjd2000 - t) * DAY_S, mu)
 
 
-def _coast(state: NDArray[np.float64], dt_s: float, mu: float) -> NDArray[np.float64]:
+def coast(state: NDArray[np.float64], dt_s: float, mu: float) -> NDArray[np.float64]:
     """Integrate two-body motion with DOP853, in units of AU and the matching velocity.
 
     NaN where that takes too many steps.

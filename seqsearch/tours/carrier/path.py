@@ -73,8 +73,38 @@ class CarrierPath:
         InputError
             The epoch is before the launch, or the orbit is no ellipse.
         """
-        state = self.states(t_mjd2000)
-        a, e, i, node, argp, anomaly = map(float, cartesian_to_classical(state, self._mu)[0])
+        return self._body(self.states(t_mjd2000)[0], t_mjd2000, body_id, name)
+
+    def release_orbit(self, craft: int, *, body_id: int, name: str = "MOTHER") -> TourBody:
+        """Return the orbit at the release of a craft, without impulses that follow at once.
+
+        Raises
+        ------
+        InputError
+            The craft is never released, or the orbit is no ellipse.
+        """
+        return self._orbit_at(CraftRelease, craft, body_id, name)
+
+    def capture_orbit(self, craft: int, *, body_id: int, name: str = "MOTHER") -> TourBody:
+        """Return the orbit at the capture of a craft, without impulses that follow at once.
+
+        Raises
+        ------
+        InputError
+            The craft is never caught, or the orbit is no ellipse.
+        """
+        return self._orbit_at(CraftCapture, craft, body_id, name)
+
+    def _orbit_at(
+        self, kind: type[CraftRelease] | type[CraftCapture], craft: int, body_id: int, name: str
+    ) -> TourBody:
+        for k, event in enumerate(self.carrier.events):
+            if isinstance(event, kind) and event.craft == craft:
+                return self._body(self.after[k], event.t_mjd2000, body_id, name)
+        raise InputError(f"carrier: no {kind.__name__} of craft {craft}")
+
+    def _body(self, state: _Array, t_mjd2000: float, body_id: int, name: str) -> TourBody:
+        a, e, i, node, argp, anomaly = map(float, cartesian_to_classical(state, self._mu))
         return TourBody(
             id=body_id,
             name=name,
