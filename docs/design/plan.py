@@ -11,6 +11,7 @@ FLOORS = {
         {"commands": "the command seqsearch, one file a sub-command"},
         {"report": "a run as one HTML page"},
         {"runs": "run folder, checkpoints, sessions, resuming, fleets"},
+        {"carriers": "a mother ship and the tours of her craft, together"},
         {"beam": "the search: passes, ranks, expanders, frontiers, rankings, scouting"},
         {"polish": "all epochs of a tour at once", "refine": "continuous thrust"},
         {"problems": "one folder a problem, found by entry points; problem files"},

@@ -15,7 +15,7 @@ from scipy.optimize import minimize
 from feasibility.constants import DAY_S
 from feasibility.orbits import Catalogue
 from feasibility.orbits.lambert import lambert, lambert_delta_v
-from seqsearch.problems.gtoc7.routes import Route
+from seqsearch.carriers.routes import Route
 from seqsearch.tours.carrier.records import (
     Carrier,
     CarrierEvent,

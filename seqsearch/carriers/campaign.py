@@ -1,0 +1,301 @@
+"""`Campaign`: the whole search for a mother ship's flight and the tours of her probes.
+
+Stages: rate orbits, look for second orbits, find the tours of all probes for the best plans,
+improve those of the best crew. What each stage found is kept in a `CampaignState`.
+"""
+
+import functools
+import pickle
+import time
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass, field
+from typing import Any, Final, final
+
+import numpy as np
+
+from feasibility.runtime.cluster import shared
+from seqsearch.carriers.crew import Crew, find_crew, find_probe
+from seqsearch.carriers.flight import carrier_of
+from seqsearch.carriers.homing import HomingSettings
+from seqsearch.carriers.plans import Plan, Screen
+from seqsearch.deadline import Deadline
+from seqsearch.problems.rendezvous import RendezvousProblem
+
+_NARROW: Final = 40
+"""Width of the beams that rate plans."""
+
+_SHARES: Final = (0.25, 0.4, 0.6)
+"""Shares of a time limit after which the stages before improving end."""
+
+
+@final
+@dataclass(frozen=True)
+class CampaignSettings:
+    """How much is done in each stage; under a time limit less of it, or more of the last.
+
+    Attributes
+    ----------
+    bodies : int
+        Asteroids whose orbits are rated.
+    pairs : int
+        Plans for which second orbits are looked for.
+    crews : int
+        Plans for which the tours of all probes are found.
+    width : int
+        Width of the beams that find them.
+    improvements : int
+        Attempts to improve a crew, where there is no time limit.
+    kept : int
+        Crews that are improved.
+    """
+
+    bodies: int = 400
+    pairs: int = 30
+    crews: int = 12
+    width: int = 150
+    improvements: int = 60
+    kept: int = 4
+
+
+@final
+@dataclass
+class CampaignState:
+    """What has been found, to go on from.
+
+    Attributes
+    ----------
+    rated, paired : list of Plan
+        Plans with one orbit, and with two.
+    looked : int
+        Bodies that were rated.
+    joined : int
+        Rated plans for which second orbits were looked for.
+    manned : int
+        Paired plans for which crews were found.
+    tried : int
+        Attempts to improve.
+    crews : list of Crew
+        The best, of different plans, best first.
+    spent_s : float
+        Wall-clock time.
+    """
+
+    rated: list[Plan] = field(default_factory=list)
+    paired: list[Plan] = field(default_factory=list)
+    looked: int = 0
+    joined: int = 0
+    manned: int = 0
+    tried: int = 0
+    crews: list[Crew] = field(default_factory=list)
+    spent_s: float = 0.0
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class _Context:
+    """What all tasks have in common."""
+
+    screen: Screen
+    problem: RendezvousProblem
+
+
+@final
+class Campaign:
+    """Runs the stages.
+
+    Parameters
+    ----------
+    screen : Screen
+        Rates plans.
+    problem : RendezvousProblem
+        One probe.
+    seed : int
+        Varies the release windows and the attempts to improve.
+    settings : CampaignSettings
+        How much.
+    executor : Executor, optional
+        Where tasks are done; default: this process.
+    workers : int
+        How many at a time.
+    time_limit_s : float, optional
+        For all sessions.
+    on_step : callable
+        Called with a line that says what happened, whenever the state has changed.
+    """
+
+    def __init__(
+        self,
+        screen: Screen,
+        problem: RendezvousProblem,
+        *,
+        seed: int,
+        settings: CampaignSettings,
+        executor: Executor | None,
+        workers: int,
+        time_limit_s: float | None,
+        on_step: Callable[[CampaignState, str], None],
+    ) -> None:
+        self._context = _Context(screen, problem)
+        self._seed = seed
+        self._settings = settings
+        self._executor = executor
+        self._at_once = max(2, 2 * workers)
+        self._limit_s = time_limit_s
+        self._on_step = on_step
+        self._common = executor and shared(executor, pickle.dumps(self._context))
+
+    def run(self, state: CampaignState) -> None:
+        """Go on from a state to the end, or until the time is up."""
+        self._begin = time.monotonic() - state.spent_s
+        for stage in (self._rate, self._pair, self._man, self._improve):
+            stage(state)
+
+    def _rate(self, state: CampaignState) -> None:
+        settings, deadline = self._settings, self._until(_SHARES[0])
+        if state.looked >= settings.bodies or deadline.passed():
+            return
+        rows = self._context.screen.crowded(settings.bodies)
+        offset = float(np.random.default_rng([self._seed, 0]).uniform(0.0, 1.0))
+        while state.looked < len(rows) and not deadline.passed():
+            chunk = rows[state.looked : state.looked + self._at_once]
+            for plans in self._all(_rated, [(int(row), _NARROW, offset) for row in chunk]):
+                state.rated += plans
+            state.looked += len(chunk)
+            state.rated.sort(key=lambda plan: -plan.value)
+            best = state.rated[0].value if state.rated else 0.0
+            self._report(state, f"{state.looked} orbits rated, best {best:.2f}")
+
+    def _pair(self, state: CampaignState) -> None:
+        deadline = self._until(_SHARES[1])
+        while state.joined < min(self._settings.pairs, len(state.rated)):
+            if deadline.passed():
+                return
+            chunk = state.rated[state.joined : state.joined + self._at_once]
+            for plans in self._all(_paired, [(plan, _NARROW) for plan in chunk]):
+                state.paired += plans
+            state.joined += len(chunk)
+            state.paired.sort(key=lambda plan: -plan.value)
+            best = state.paired[0].value if state.paired else 0.0
+            self._report(state, f"{state.joined} plans continued, best {best:.2f}")
+
+    def _man(self, state: CampaignState) -> None:
+        deadline = self._until(_SHARES[2])
+        plans = _different([*state.paired, *state.rated])
+        while state.manned < min(self._settings.crews, len(plans)):
+            if deadline.passed() and state.crews:
+                return
+            chunk = plans[state.manned : state.manned + self._at_once]
+            wide = HomingSettings(width=self._settings.width)
+            for crew in self._all(_manned, [(plan, wide) for plan in chunk]):
+                self._keep(state, crew)
+            state.manned += len(chunk)
+            self._report(state, f"{state.manned} crews found, {_told(state)}")
+
+    def _improve(self, state: CampaignState) -> None:
+        settings, deadline = self._settings, self._until(1.0)
+        while state.crews and not deadline.passed():
+            if self._limit_s is None and state.tried >= settings.improvements:
+                return
+            moves = [self._move(state, state.tried + k) for k in range(self._at_once)]
+            for crew in self._all(_improved, moves):
+                self._keep(state, crew)
+            state.tried += len(moves)
+            self._report(state, f"{state.tried} attempts, {_told(state)}")
+
+    def _move(self, state: CampaignState, number: int) -> tuple[Crew, int, HomingSettings, float]:
+        """Return a crew, one of its probes, and how that one is looked for again."""
+        rng = np.random.default_rng([self._seed, 1, number])
+        crew = state.crews[min(int(rng.exponential(0.8)), len(state.crews) - 1)]
+        settings = HomingSettings(
+            width=int(self._settings.width * rng.uniform(0.5, 3.0)),
+            propellant_weight=float(rng.uniform(0.05, 0.5)),
+            distance_weight=float(rng.uniform(0.05, 0.6)),
+        )
+        return crew, int(rng.integers(len(crew.flights))), settings, float(rng.uniform(0.0, 60.0))
+
+    def _keep(self, state: CampaignState, crew: Crew | None) -> None:
+        """Put a crew among the best, one of each plan, if its mother ship can fly."""
+        if crew is None or carrier_of(self._context.screen, crew) is None:
+            return
+        same = [k for k, other in enumerate(state.crews) if other.plan.same(crew.plan)]
+        if same and state.crews[same[0]].worth() >= crew.worth():
+            return
+        for k in same:
+            del state.crews[k]
+        state.crews.append(crew)
+        state.crews.sort(key=lambda crew: -crew.worth())
+        del state.crews[self._settings.kept :]
+
+    def _all(self, task: Callable[..., Any], calls: Sequence[tuple[Any, ...]]) -> Iterator[Any]:
+        """Yield the results of a task in the order of its calls."""
+        if self._executor is None:
+            for call in calls:
+                yield task(self._context, *call)
+            return
+        futures = [self._executor.submit(_there, self._common, task, call) for call in calls]
+        for future in futures:
+            yield future.result()
+
+    def _until(self, share: float) -> Deadline:
+        left = None if self._limit_s is None else share * self._limit_s - self._spent_s()
+        return Deadline(left)
+
+    def _spent_s(self) -> float:
+        return time.monotonic() - self._begin
+
+    def _report(self, state: CampaignState, line: str) -> None:
+        state.spent_s = self._spent_s()
+        self._on_step(state, line)
+
+
+def _rated(context: _Context, row: int, width: int, offset: float) -> list[Plan]:
+    return context.screen.rate(row, width, offset)
+
+
+def _paired(context: _Context, plan: Plan, width: int) -> list[Plan]:
+    return context.screen.seconds(plan, width)
+
+
+def _manned(context: _Context, plan: Plan, settings: HomingSettings) -> Crew | None:
+    count = context.screen.rules.craft_count
+    crew = find_crew(context.screen, context.problem, plan, count, settings)
+    return crew if len(crew.flights) == count else None
+
+
+def _improved(
+    context: _Context, crew: Crew, number: int, settings: HomingSettings, offset_days: float
+) -> Crew | None:
+    flight = find_probe(
+        context.screen, context.problem, crew.plan, crew.closed(number), settings, offset_days
+    )
+    return None if flight is None else crew.with_flight(number, flight)
+
+
+@functools.lru_cache(maxsize=1)
+def _unpacked(context: bytes) -> _Context:
+    unpacked = pickle.loads(context)
+    assert isinstance(unpacked, _Context)
+    return unpacked
+
+
+def _there(context: bytes, task: Callable[..., Any], call: tuple[Any, ...]) -> Any:
+    return task(_unpacked(context), *call)
+
+
+def _different(plans: list[Plan]) -> list[Plan]:
+    """Return plans of different orbits, best first."""
+    seen: set[tuple[int, int]] = set()
+    chosen = []
+    for plan in sorted(plans, key=lambda plan: -plan.value):
+        if (plan.first, plan.second) not in seen:
+            seen.add((plan.first, plan.second))
+            chosen.append(plan)
+    return chosen
+
+
+def _told(state: CampaignState) -> str:
+    if not state.crews:
+        return "none that a mother ship can serve"
+    best = state.crews[0]
+    return f"best {best.visits()} asteroids, {best.slack_days():.0f} days left"

@@ -1,0 +1,163 @@
+"""`Crew`: the tours of all probes of one mother ship, and how they are found.
+
+One probe after another, each leaves its asteroids to none that follow; then each is looked for
+again, with the others' asteroids closed.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+from typing import Final, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seqsearch.carriers.homing import DAYS_PER_VISIT, HomingSettings
+from seqsearch.carriers.plans import SPREAD_DAYS, STAY_DAYS, Plan, Screen
+from seqsearch.polish.flight import Flight
+from seqsearch.polish.itinerary import Itinerary
+from seqsearch.polish.retiming import retime
+from seqsearch.problems.rendezvous import RendezvousProblem
+
+_Index = NDArray[np.intp]
+
+TOUCH_DAYS: Final = 0.01
+"""Flight time between the mother ship and the asteroid at which she is: they are together."""
+
+WAIT_DAYS: Final = STAY_DAYS + TOUCH_DAYS
+"""What it costs a probe to stay at such an asteroid."""
+
+_ITERATIONS: Final = 12
+_TRIED: Final = 6
+"""Predicted tours of which the timetables are made good until one fits."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Crew:
+    """Tours from the first orbit to the second, each flown by the leg solver.
+
+    Attributes
+    ----------
+    plan : Plan
+        The orbits.
+    flights : tuple of Flight
+        One a probe. The first and the last row of each are the orbits.
+    """
+
+    plan: Plan
+    flights: tuple[Flight, ...]
+
+    def visits(self) -> int:
+        """Return the asteroids that count, those of the orbits included."""
+        return sum(len(flight.itinerary) - 1 for flight in self.flights) + sum(
+            probe is not None for probe in self.waits()
+        )
+
+    def slack_days(self) -> float:
+        """Return the days that all probes together have left."""
+        return sum(_SIX_YEARS - flight.itinerary.duration_days for flight in self.flights)
+
+    def worth(self) -> float:
+        """Return the visits, and the days that are left as shares of a visit."""
+        return self.visits() + self.slack_days() / DAYS_PER_VISIT / 10.0
+
+    def closed(self, but: int | None = None) -> tuple[int, ...]:
+        """Return rows that probes visit, those of one left out."""
+        return tuple(
+            int(row)
+            for number, flight in enumerate(self.flights)
+            if number != but
+            for row in flight.itinerary.rows[1:-1]
+        )
+
+    def waits(self) -> tuple[int | None, int | None]:
+        """Return the probes that stay at the asteroids of the first and the second orbit.
+
+        None where no probe has the time, or where the orbits are the same one.
+        """
+        slack = [_SIX_YEARS - flight.itinerary.duration_days for flight in self.flights]
+        numbers: list[int | None] = [*range(len(slack)), None]
+        best: tuple[int | None, int | None] = (None, None)
+        value = (0, -np.inf)
+        for first, second in product(numbers, numbers):
+            if self.plan.first == self.plan.second and second is not None:
+                continue
+            left = list(slack)
+            for probe in (first, second):
+                if probe is not None:
+                    left[probe] -= WAIT_DAYS
+            count = (first is not None) + (second is not None)
+            if min(left, default=0.0) >= 0.0 and (count, min(left, default=0.0)) > value:
+                best, value = (first, second), (count, min(left, default=0.0))
+        return best
+
+    def with_flight(self, number: int, flight: Flight) -> "Crew":
+        """Return the crew with another tour of one probe."""
+        flights = list(self.flights)
+        flights[number] = flight
+        return replace(self, flights=tuple(flights))
+
+
+_SIX_YEARS: Final = 2191.5
+
+
+def probe_problem(
+    problem: RendezvousProblem, plan: Plan, duration_days: float
+) -> RendezvousProblem:
+    """Return the problem of one probe of a plan, of which retiming keeps the limits."""
+    window = (plan.window_mjd2000, plan.window_mjd2000 + SPREAD_DAYS)
+    return replace(problem, first_departure_mjd2000=window, max_duration_days=duration_days)
+
+
+def find_probe(
+    screen: Screen,
+    problem: RendezvousProblem,
+    plan: Plan,
+    avoid: Sequence[int],
+    settings: HomingSettings,
+    offset_days: float = 0.0,
+) -> Flight | None:
+    """Return the best tour of one probe that can be flown in time; None for none."""
+    own = probe_problem(problem, plan, problem.max_duration_days)
+    found: Flight | None = None
+    tours = screen.tours(plan, replace(settings, results=_TRIED), tuple(avoid), offset_days)
+    for tour in tours:
+        if found is not None and tour.visits < len(found.itinerary) - 1:
+            continue
+        flight = fitted(own, tour.itinerary)
+        if flight is not None and (found is None or _better(flight, found)):
+            found = flight
+    return found
+
+
+def fitted(problem: RendezvousProblem, itinerary: Itinerary) -> Flight | None:
+    """Return an itinerary with its best timetable; None where it does not keep the limits."""
+    retimed = retime(problem, itinerary, max_iterations=_ITERATIONS)
+    if retimed is None or not retimed.flight.keeps_rules(problem):
+        return None
+    return retimed.flight
+
+
+def _better(one: Flight, other: Flight) -> bool:
+    return (len(one.itinerary), -one.itinerary.duration_days) > (
+        len(other.itinerary),
+        -other.itinerary.duration_days,
+    )
+
+
+def find_crew(
+    screen: Screen,
+    problem: RendezvousProblem,
+    plan: Plan,
+    count: int,
+    settings: HomingSettings,
+) -> Crew:
+    """Return the tours of some probes, found one after another; fewer where there are no more."""
+    crew = Crew(plan, ())
+    for _ in range(count):
+        flight = find_probe(screen, problem, plan, crew.closed(), settings)
+        if flight is None:
+            break
+        crew = replace(crew, flights=(*crew.flights, flight))
+    return crew

@@ -1,0 +1,51 @@
+"""From a crew to the flight of its mother ship."""
+
+from feasibility.errors import InputError
+from seqsearch.carriers.crew import TOUCH_DAYS, WAIT_DAYS, Crew
+from seqsearch.carriers.mother import change_orbit, mother_flight
+from seqsearch.carriers.plans import Screen
+from seqsearch.tours.carrier.path import fly_carrier
+from seqsearch.tours.carrier.records import Carrier
+
+
+def releases_of(crew: Crew) -> list[float]:
+    """Return when each probe leaves the mother ship: one that stays there at first, earlier."""
+    first, _ = crew.waits()
+    return [
+        float(flight.itinerary.t_dep_mjd2000[0]) - (WAIT_DAYS if number == first else 0.0)
+        for number, flight in enumerate(crew.flights)
+    ]
+
+
+def captures_of(crew: Crew) -> list[float]:
+    """Return when each probe is caught: one that stays there at last, later."""
+    _, second = crew.waits()
+    return [
+        float(flight.itinerary.t_arr_mjd2000[-1]) + (WAIT_DAYS if number == second else 0.0)
+        for number, flight in enumerate(crew.flights)
+    ]
+
+
+def carrier_of(screen: Screen, crew: Crew) -> Carrier | None:
+    """Return the mother ship's flight; None where she has not the propellant or the time."""
+    route = screen.route(crew.plan)
+    if route is None:
+        return None
+    releases, captures = releases_of(crew), captures_of(crew)
+    last, first = max(releases), min(captures)
+    if min(releases) < route.second_mjd2000 or first <= last:
+        return None
+    change = None
+    if crew.plan.first != crew.plan.second:
+        between = last + TOUCH_DAYS, first - TOUCH_DAYS
+        change = change_orbit(screen.catalogue, crew.plan.first, crew.plan.second, between)
+    masses = [float(flight.mass[-1]) for flight in crew.flights]
+    try:
+        carrier = mother_flight(
+            screen.rules, route, change, releases, list(zip(captures, masses, strict=True))
+        )
+    except InputError:
+        return None
+    path = fly_carrier(carrier)
+    long = max(captures) - route.launch_mjd2000 > screen.rules.max_duration_days
+    return None if long or path.propellant_left_kg < 0.0 else carrier
