@@ -65,6 +65,12 @@ class CampaignState:
 
     Attributes
     ----------
+    seed : int
+        Varies the release windows and the attempts to improve.
+    limit_s : float, optional
+        Wall-clock time of all sessions; None for no limit.
+    catalogue_sha256 : str
+        Which asteroid table it is.
     rated, paired : list of Plan
         Plans with one orbit, and with two.
     looked : int
@@ -81,6 +87,9 @@ class CampaignState:
         Wall-clock time.
     """
 
+    seed: int = 0
+    limit_s: float | None = None
+    catalogue_sha256: str = ""
     rated: list[Plan] = field(default_factory=list)
     paired: list[Plan] = field(default_factory=list)
     looked: int = 0
@@ -110,16 +119,12 @@ class Campaign:
         Rates plans.
     problem : RendezvousProblem
         One probe.
-    seed : int
-        Varies the release windows and the attempts to improve.
     settings : CampaignSettings
         How much.
     executor : Executor, optional
         Where tasks are done; default: this process.
     workers : int
         How many at a time.
-    time_limit_s : float, optional
-        For all sessions.
     on_step : callable
         Called with a line that says what happened, whenever the state has changed.
     """
@@ -129,25 +134,22 @@ class Campaign:
         screen: Screen,
         problem: RendezvousProblem,
         *,
-        seed: int,
         settings: CampaignSettings,
         executor: Executor | None,
         workers: int,
-        time_limit_s: float | None,
         on_step: Callable[[CampaignState, str], None],
     ) -> None:
         self._context = _Context(screen, problem)
-        self._seed = seed
         self._settings = settings
         self._executor = executor
         self._at_once = max(2, 2 * workers)
-        self._limit_s = time_limit_s
         self._on_step = on_step
         self._common = executor and shared(executor, pickle.dumps(self._context))
 
     def run(self, state: CampaignState) -> None:
         """Go on from a state to the end, or until the time is up."""
         self._begin = time.monotonic() - state.spent_s
+        self._limit_s = state.limit_s
         for stage in (self._rate, self._pair, self._man, self._improve):
             stage(state)
 
@@ -156,7 +158,7 @@ class Campaign:
         if state.looked >= settings.bodies or deadline.passed():
             return
         rows = self._context.screen.crowded(settings.bodies)
-        offset = float(np.random.default_rng([self._seed, 0]).uniform(0.0, 1.0))
+        offset = float(np.random.default_rng([state.seed, 0]).uniform(0.0, 1.0))
         while state.looked < len(rows) and not deadline.passed():
             chunk = rows[state.looked : state.looked + self._at_once]
             for plans in self._all(_rated, [(int(row), _NARROW, offset) for row in chunk]):
@@ -205,7 +207,7 @@ class Campaign:
 
     def _move(self, state: CampaignState, number: int) -> tuple[Crew, int, HomingSettings, float]:
         """Return a crew, one of its probes, and how that one is looked for again."""
-        rng = np.random.default_rng([self._seed, 1, number])
+        rng = np.random.default_rng([state.seed, 1, number])
         crew = state.crews[min(int(rng.exponential(0.8)), len(state.crews) - 1)]
         settings = HomingSettings(
             width=int(self._settings.width * rng.uniform(0.5, 3.0)),

@@ -24,7 +24,10 @@ _Index = NDArray[np.intp]
 TOUCH_DAYS: Final = 0.01
 """Flight time between the mother ship and the asteroid at which she is: they are together."""
 
-WAIT_DAYS: Final = STAY_DAYS + TOUCH_DAYS
+STAY_MARGIN_DAYS: Final = 0.002
+"""By how much stays exceed the shortest one, as epochs are rounded."""
+
+WAIT_DAYS: Final = STAY_DAYS + TOUCH_DAYS + STAY_MARGIN_DAYS
 """What it costs a probe to stay at such an asteroid."""
 
 _ITERATIONS: Final = 12
@@ -57,6 +60,10 @@ class Crew:
     def slack_days(self) -> float:
         """Return the days that all probes together have left."""
         return sum(_SIX_YEARS - flight.itinerary.duration_days for flight in self.flights)
+
+    def mass_kg(self) -> float:
+        """Return what is left of all probes."""
+        return float(sum(flight.mass[-1] for flight in self.flights))
 
     def worth(self) -> float:
         """Return the visits, and the days that are left as shares of a visit."""

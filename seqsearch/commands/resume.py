@@ -41,8 +41,21 @@ def add_parser(commands: "Commands") -> None:
 
 
 def _resume(options: argparse.Namespace) -> int:
+    from seqsearch.budget import Limits
+    from seqsearch.runs.carrier_run import is_carrier_search, resume_carrier
     from seqsearch.runs.resuming import resume_search
 
+    path = Path(options.path)
+    if is_carrier_search(path):
+        if options.from_rank is not None or options.max_solves is not None:
+            raise InputError(f"{path}: a carrier's run has neither ranks nor a number of solves")
+        limits = Limits(
+            time_limit_s=seconds(options.time_limit),
+            workers=options.workers,
+            scheduler=options.scheduler,
+        )
+        code = resume_carrier(path, limits, options.catalogue)
+        return print_result(options, path, code)
     code = resume_search(
         Path(options.path),
         after=None if options.from_rank is None else parse_rank(options.from_rank),

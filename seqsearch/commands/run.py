@@ -123,7 +123,9 @@ def run_search(
         with_catalogue,
         with_selection,
     )
+    from seqsearch.problems.registry import is_carried
     from seqsearch.runs.begin import begin_search
+    from seqsearch.runs.carrier_run import begin_carrier
     from seqsearch.runs.fleet_run import run_fleet
     from seqsearch.runs.flying import fly_run
     from seqsearch.runs.polishing import polish_run
@@ -142,6 +144,8 @@ def run_search(
     folder = out or Path("runs") / config.problem.name
     if config.mission.sequence:
         code = fly_run(config, folder, seed, limits)
+    elif is_carried(config.problem.name):
+        code = begin_carrier(config, folder, seed, limits)
     elif config.fleet.probes > 1:
         code = run_fleet(config, folder, seed=seed, limits=limits, search_probe=begin_search)
     else:

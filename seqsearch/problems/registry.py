@@ -92,6 +92,17 @@ def builtin_problems() -> dict[str, str]:
     return dict(sorted(texts.items()))
 
 
+def is_carried(name: str) -> bool:
+    """Tell whether a carrier flies a problem.
+
+    Raises
+    ------
+    InputError
+        As `plugins`.
+    """
+    return any(name in plugin.carriers for plugin in plugins().values())
+
+
 def carrier_rules(name: str) -> CarrierRules:
     """Return the rules of a problem that a carrier flies.
 

@@ -81,7 +81,7 @@ class RunFolder:
         """
         new_folder(path)
         folder = cls(path)
-        write_text(path / CONFIG, to_toml(_portable(config, path)))
+        write_text(path / CONFIG, to_toml(portable(config, path)))
         write_json(path / PROVENANCE, provenance() | {"seed": seed})
         return folder
 
@@ -169,7 +169,7 @@ class RunFolder:
         write_text(self.path / CSV, to_csv(tour))
 
 
-def _portable(config: Config, folder: Path) -> Config:
+def portable(config: Config, folder: Path) -> Config:
     """Return the configuration with the table's path as seen from the run folder."""
     file = config.catalogue.file
     return config if file is None else with_catalogue(config, os.path.relpath(file, folder))

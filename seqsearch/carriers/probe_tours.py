@@ -1,0 +1,116 @@
+"""The tours of a crew as problem files and records: from the mother ship and back to her."""
+
+from typing import Final
+
+import msgspec
+import numpy as np
+
+from feasibility import InputError
+from feasibility.constants import AU, MJD2000_MJD
+from feasibility.orbits import Catalogue
+from seqsearch.carriers.crew import TOUCH_DAYS, WAIT_DAYS, Crew
+from seqsearch.carriers.plans import SPREAD_DAYS
+from seqsearch.polish.flight import fly
+from seqsearch.polish.itinerary import Itinerary
+from seqsearch.problems.extra_bodies import BodyTable
+from seqsearch.problems.problem_file import Config, build_problem
+from seqsearch.tours.tour import Tour
+
+RELEASE_ID: Final = 10_000_001
+CAPTURE_ID: Final = 10_000_002
+"""Ids of the mother ship's orbits, which no asteroid has."""
+
+
+def probe_config(config: Config, catalogue: Catalogue, crew: Crew, number: int) -> Config:
+    """Return the problem file of one probe of a crew.
+
+    Its tours start at the mother ship and end there, and leave the other probes' asteroids alone.
+
+    Parameters
+    ----------
+    config : Config
+        Of the whole run.
+    catalogue : Catalogue
+        The asteroids.
+    crew : Crew
+        All probes; rows are those of the catalogue.
+    number : int
+        Which of them, from 0.
+    """
+    plan = crew.plan
+    waits = crew.waits()
+    others = [int(catalogue.ids[row]) for row in crew.closed(number)]
+    others += [
+        int(catalogue.ids[row])
+        for row, probe in zip((plan.first, plan.second), waits, strict=True)
+        if probe not in (None, number)
+    ]
+    window = plan.window_mjd2000 + MJD2000_MJD
+    return msgspec.structs.replace(
+        config,
+        bodies=(
+            _orbit(catalogue, plan.first, RELEASE_ID, "mother ship at the release"),
+            _orbit(catalogue, plan.second, CAPTURE_ID, "mother ship at the capture"),
+        ),
+        mission=msgspec.structs.replace(
+            config.mission,
+            first_departure_mjd=(window - WAIT_DAYS - 1.0, window + SPREAD_DAYS + 1.0),
+            start_ids=(RELEASE_ID,),
+            end_id=CAPTURE_ID,
+        ),
+        catalogue=msgspec.structs.replace(
+            config.catalogue, exclude_ids=(*config.catalogue.exclude_ids, *sorted(set(others)))
+        ),
+        fleet=msgspec.structs.replace(config.fleet, probes=1),
+    )
+
+
+def probe_tour(config: Config, catalogue: Catalogue, crew: Crew, number: int) -> Tour:
+    """Return the tour of one probe of a crew, flown once more with its stays at the orbits' bodies.
+
+    Parameters
+    ----------
+    config : Config
+        That of `probe_config`.
+    catalogue, crew, number
+        As there.
+
+    Raises
+    ------
+    InputError
+        A leg has no solution; cannot be, as it was flown before.
+    """
+    problem = build_problem(config, catalogue)
+    itinerary = crew.flights[number].itinerary
+    ids = catalogue.ids[itinerary.rows].tolist()
+    t_dep, tof = list(itinerary.t_dep_mjd2000), list(itinerary.tof_days)
+    first, second = crew.waits()
+    if first == number:
+        ids, t_dep, tof = [RELEASE_ID, *ids], [t_dep[0] - WAIT_DAYS, *t_dep], [TOUCH_DAYS, *tof]
+    else:
+        ids[0] = RELEASE_ID
+    if second == number:
+        away = t_dep[-1] + tof[-1] + WAIT_DAYS - TOUCH_DAYS
+        ids, t_dep, tof = [*ids, CAPTURE_ID], [*t_dep, away], [*tof, TOUCH_DAYS]
+    else:
+        ids[-1] = CAPTURE_ID
+    rows = problem.catalogue.rows_of(np.asarray(ids)).astype(np.intp)
+    flight = fly(problem, Itinerary(rows, np.array(t_dep), np.array(tof)))
+    if flight is None:
+        raise InputError(f"probe {number + 1}: a leg has no solution")
+    return flight.to_tour(problem)
+
+
+def _orbit(catalogue: Catalogue, row: int, body_id: int, name: str) -> BodyTable:
+    a, e, i, node, argp, anomaly = (float(value) for value in catalogue.elements[row])
+    return BodyTable(
+        name=name,
+        id=body_id,
+        a_au=a / AU,
+        e=e,
+        i_deg=float(np.degrees(i)),
+        node_deg=float(np.degrees(node)),
+        argp_deg=float(np.degrees(argp)),
+        mean_anomaly_deg=float(np.degrees(anomaly)),
+        epoch_mjd=float(catalogue.epoch_mjd2000[row]) + MJD2000_MJD,
+    )

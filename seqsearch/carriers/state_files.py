@@ -1,0 +1,146 @@
+"""The state of a campaign as a file, from which it goes on."""
+
+from pathlib import Path
+from typing import Final, final
+
+import msgspec
+import numpy as np
+
+from feasibility import InputError
+from feasibility.runtime.atomic import write_text
+from seqsearch.carriers.campaign import CampaignState
+from seqsearch.carriers.crew import Crew
+from seqsearch.carriers.plans import Plan
+from seqsearch.polish.flight import fly
+from seqsearch.polish.itinerary import Itinerary
+from seqsearch.problems.rendezvous import RendezvousProblem
+
+_FORMAT: Final = "seqsearch-campaign-1"
+
+_PlanRow = tuple[int, int, float, float]
+"""Ids of both orbits' bodies, window, value."""
+
+
+class _Record(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A JSON object in which every key is known."""
+
+
+@final
+class _ProbeRecord(_Record, frozen=True, kw_only=True):
+    ids: tuple[int, ...]
+    t_dep_mjd2000: tuple[float, ...]
+    tof_days: tuple[float, ...]
+
+
+@final
+class _CrewRecord(_Record, frozen=True, kw_only=True):
+    plan: _PlanRow
+    probes: tuple[_ProbeRecord, ...]
+
+
+@final
+class _StateRecord(_Record, frozen=True, kw_only=True):
+    format: str
+    seed: int
+    limit_s: float | None
+    spent_s: float
+    catalogue_sha256: str
+    looked: int
+    joined: int
+    manned: int
+    tried: int
+    rated: tuple[_PlanRow, ...]
+    paired: tuple[_PlanRow, ...]
+    crews: tuple[_CrewRecord, ...]
+
+
+def write_state(path: Path, state: CampaignState, problem: RendezvousProblem) -> None:
+    """Write the state of a campaign.
+
+    Raises
+    ------
+    InputError
+        It cannot be written.
+    """
+    ids = problem.catalogue.ids
+
+    def plan_row(plan: Plan) -> _PlanRow:
+        return int(ids[plan.first]), int(ids[plan.second]), plan.window_mjd2000, plan.value
+
+    record = _StateRecord(
+        format=_FORMAT,
+        seed=state.seed,
+        limit_s=state.limit_s,
+        spent_s=state.spent_s,
+        catalogue_sha256=state.catalogue_sha256,
+        looked=state.looked,
+        joined=state.joined,
+        manned=state.manned,
+        tried=state.tried,
+        rated=tuple(map(plan_row, state.rated)),
+        paired=tuple(map(plan_row, state.paired)),
+        crews=tuple(
+            _CrewRecord(
+                plan=plan_row(crew.plan),
+                probes=tuple(
+                    _ProbeRecord(
+                        ids=tuple(ids[flight.itinerary.rows].tolist()),
+                        t_dep_mjd2000=tuple(flight.itinerary.t_dep_mjd2000.tolist()),
+                        tof_days=tuple(flight.itinerary.tof_days.tolist()),
+                    )
+                    for flight in crew.flights
+                ),
+            )
+            for crew in state.crews
+        ),
+    )
+    write_text(path, msgspec.json.encode(record).decode() + "\n")
+
+
+def read_state(path: Path, problem: RendezvousProblem) -> CampaignState:
+    """Read the state of a campaign; the tours of its crews are flown once more.
+
+    Raises
+    ------
+    InputError
+        The file is missing or damaged, or a body is not in the catalogue.
+    """
+    try:
+        record = msgspec.json.decode(path.read_bytes(), type=_StateRecord)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror})") from None
+    except msgspec.DecodeError as error:
+        raise InputError(f"{path}: not a complete {_FORMAT} file ({error})") from None
+    if record.format != _FORMAT:
+        raise InputError(f"{path}: format {record.format!r}, expected {_FORMAT!r}")
+
+    def plan_of(row: _PlanRow) -> Plan:
+        first, second = problem.catalogue.rows_of(np.array(row[:2]))
+        return Plan(int(first), int(second), row[2], row[3])
+
+    def crew_of(crew: _CrewRecord) -> Crew:
+        flights = []
+        for probe in crew.probes:
+            rows = problem.catalogue.rows_of(np.array(probe.ids)).astype(np.intp)
+            flight = fly(
+                problem,
+                Itinerary(rows, np.array(probe.t_dep_mjd2000), np.array(probe.tof_days)),
+            )
+            if flight is None:
+                raise InputError(f"{path}: a leg of a tour has no solution")
+            flights.append(flight)
+        return Crew(plan_of(crew.plan), tuple(flights))
+
+    return CampaignState(
+        seed=record.seed,
+        limit_s=record.limit_s,
+        spent_s=record.spent_s,
+        catalogue_sha256=record.catalogue_sha256,
+        looked=record.looked,
+        joined=record.joined,
+        manned=record.manned,
+        tried=record.tried,
+        rated=[plan_of(row) for row in record.rated],
+        paired=[plan_of(row) for row in record.paired],
+        crews=[crew_of(crew) for crew in record.crews],
+    )
