@@ -15,7 +15,7 @@ from typing import Any, Final, final
 import numpy as np
 
 from feasibility.runtime.cluster import shared
-from seqsearch.carriers.crew import Crew, find_crew, find_probe
+from seqsearch.carriers.crew import Crew, find_crew, find_probe, polished_probe, rebuilt_probe
 from seqsearch.carriers.flight import carrier_of
 from seqsearch.carriers.homing import HomingSettings
 from seqsearch.carriers.plans import Plan, Screen
@@ -24,6 +24,11 @@ from seqsearch.problems.rendezvous import RendezvousProblem
 
 _NARROW: Final = 40
 """Width of the beams that rate plans."""
+
+_WIDE: Final = 150
+_ANEW: Final = 0.25
+_REBUILT: Final = 0.5
+"""Width of the beams that improve a tour, about; shares of attempts; the rest are polished."""
 
 _SHARES: Final = (0.25, 0.4, 0.6)
 """Shares of a time limit after which the stages before improving end."""
@@ -205,16 +210,11 @@ class Campaign:
             state.tried += len(moves)
             self._report(state, f"{state.tried} attempts, {_told(state)}")
 
-    def _move(self, state: CampaignState, number: int) -> tuple[Crew, int, HomingSettings, float]:
-        """Return a crew, one of its probes, and how that one is looked for again."""
+    def _move(self, state: CampaignState, number: int) -> tuple[Crew, int, int]:
+        """Return a crew, one of its probes, and a seed for how that one is improved."""
         rng = np.random.default_rng([state.seed, 1, number])
         crew = state.crews[min(int(rng.exponential(0.8)), len(state.crews) - 1)]
-        settings = HomingSettings(
-            width=int(self._settings.width * rng.uniform(0.5, 3.0)),
-            propellant_weight=float(rng.uniform(0.05, 0.5)),
-            distance_weight=float(rng.uniform(0.05, 0.6)),
-        )
-        return crew, int(rng.integers(len(crew.flights))), settings, float(rng.uniform(0.0, 60.0))
+        return crew, int(rng.integers(len(crew.flights))), int(rng.integers(1 << 31))
 
     def _keep(self, state: CampaignState, crew: Crew | None) -> None:
         """Put a crew among the best, one of each plan, if its mother ship can fly."""
@@ -265,12 +265,24 @@ def _manned(context: _Context, plan: Plan, settings: HomingSettings) -> Crew | N
     return crew if len(crew.flights) == count else None
 
 
-def _improved(
-    context: _Context, crew: Crew, number: int, settings: HomingSettings, offset_days: float
-) -> Crew | None:
-    flight = find_probe(
-        context.screen, context.problem, crew.plan, crew.closed(number), settings, offset_days
+def _improved(context: _Context, crew: Crew, number: int, seed: int) -> Crew | None:
+    """Look for a better tour of one probe: anew, from some visit on, or by exchanges."""
+    screen, problem = context.screen, context.problem
+    rng = np.random.default_rng(seed)
+    settings = HomingSettings(
+        width=int(_WIDE * rng.uniform(0.5, 3.0)),
+        propellant_weight=float(rng.uniform(0.05, 0.5)),
+        distance_weight=float(rng.uniform(0.05, 0.6)),
     )
+    kind = rng.random()
+    if kind < _ANEW:
+        offset, closed = float(rng.uniform(0.0, 60.0)), crew.closed(number)
+        flight = find_probe(screen, problem, crew.plan, closed, settings, offset)
+    elif kind < _ANEW + _REBUILT:
+        kept = int(rng.integers(1, len(crew.flights[number].itinerary) - 2))
+        flight = rebuilt_probe(screen, problem, crew, number, kept, settings)
+    else:
+        flight = polished_probe(problem, screen.predictor, crew, number, seed)
     return None if flight is None else crew.with_flight(number, flight)
 
 

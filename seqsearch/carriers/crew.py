@@ -12,9 +12,12 @@ from typing import Final, final
 import numpy as np
 from numpy.typing import NDArray
 
+from feasibility.classifier.predictor import LegPredictor
 from seqsearch.carriers.homing import DAYS_PER_VISIT, HomingSettings
 from seqsearch.carriers.plans import SPREAD_DAYS, STAY_DAYS, Plan, Screen
-from seqsearch.polish.flight import Flight
+from seqsearch.core.nodes import Nodes
+from seqsearch.polish import PolishSettings, polish
+from seqsearch.polish.flight import Flight, fly
 from seqsearch.polish.itinerary import Itinerary
 from seqsearch.polish.retiming import retime
 from seqsearch.problems.rendezvous import RendezvousProblem
@@ -30,6 +33,7 @@ STAY_MARGIN_DAYS: Final = 0.002
 WAIT_DAYS: Final = STAY_DAYS + TOUCH_DAYS + STAY_MARGIN_DAYS
 """What it costs a probe to stay at such an asteroid."""
 
+_POLISH: Final = PolishSettings(rounds=2, moves_per_round=4)
 _ITERATIONS: Final = 12
 _TRIED: Final = 6
 """Predicted tours of which the timetables are made good until one fits."""
@@ -136,6 +140,86 @@ def find_probe(
         if flight is not None and (found is None or _better(flight, found)):
             found = flight
     return found
+
+
+def rebuilt_probe(
+    screen: Screen,
+    problem: RendezvousProblem,
+    crew: Crew,
+    number: int,
+    kept: int,
+    settings: HomingSettings,
+) -> Flight | None:
+    """Return a better tour of a probe that keeps its first visits; None for none.
+
+    Parameters
+    ----------
+    kept : int
+        How many visits, at least one.
+    """
+    before = crew.flights[number]
+    head = before.itinerary.part(0, kept)
+    node = Nodes(
+        row=head.rows[-1:],
+        depth=np.array([kept]),
+        t_ready_mjd2000=before.itinerary.t_dep_mjd2000[kept : kept + 1],
+        t_arr_mjd2000=head.t_arr_mjd2000[-1:],
+        t_first_mjd2000=head.t_dep_mjd2000[:1],
+        mass=before.mass[kept : kept + 1],
+        visited=head.rows[None, :],
+        tree_id=np.array([-1]),
+        parent_id=np.array([-1]),
+    )
+    plan = crew.plan
+    avoid = np.unique([plan.first, plan.second, *crew.closed(number)])
+    own = probe_problem(problem, plan, problem.max_duration_days)
+    best = before
+    found = screen.homing.run(node, plan.second, avoid, replace(settings, results=_TRIED))
+    for tour in found:
+        if tour.visits < len(best.itinerary) - 1:
+            continue
+        flight = fitted(own, joined(head, tour.itinerary))
+        if flight is not None and _better(flight, best):
+            best = flight
+    return None if best is before else best
+
+
+def joined(head: Itinerary, tail: Itinerary) -> Itinerary:
+    """Return two itineraries as one; the second begins where the first ends."""
+    return Itinerary(
+        np.concatenate([head.rows, tail.rows[1:]]),
+        np.concatenate([head.t_dep_mjd2000, tail.t_dep_mjd2000]),
+        np.concatenate([head.tof_days, tail.tof_days]),
+    )
+
+
+def polished_probe(
+    problem: RendezvousProblem,
+    predictor: LegPredictor,
+    crew: Crew,
+    number: int,
+    seed: int,
+) -> Flight | None:
+    """Return a better tour of a probe by exchanges at both ends; None for none."""
+    ids, plan = problem.catalogue.ids, crew.plan
+    ends = int(ids[plan.first]), int(ids[plan.second])
+    own = replace(
+        probe_problem(problem, plan, problem.max_duration_days),
+        start_ids=ends[:1],
+        end_id=ends[1],
+        unscored_ids=tuple(sorted(set(ends))),
+        excluded_ids=tuple(sorted(int(ids[row]) for row in crew.closed(number))),
+    )
+    before = crew.flights[number]
+    result = polish(
+        own,
+        before.to_tour(own),
+        predictor=predictor,
+        rng=np.random.default_rng(seed),
+        settings=_POLISH,
+    )
+    flight = fly(problem, Itinerary.from_tour(own, result.tour))
+    return flight if flight is not None and _better(flight, before) else None
 
 
 def fitted(problem: RendezvousProblem, itinerary: Itinerary) -> Flight | None:

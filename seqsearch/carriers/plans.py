@@ -111,6 +111,8 @@ class Screen:
     ) -> None:
         self.catalogue: Catalogue = problem.catalogue
         self.rules = rules
+        self.predictor = predictor
+        self._routes: dict[tuple[int, float], Route | None] = {}
         self.duration_days = problem.max_duration_days
         longer = replace(problem, max_duration_days=problem.max_duration_days + OVERTIME_DAYS)
         self.homing = Homing(longer, predictor, settings)
@@ -204,6 +206,12 @@ class Screen:
 
     def route(self, plan: Plan) -> Route | None:
         """Return the cheapest way to the first orbit that is in time; None for none."""
+        key = plan.first, plan.window_mjd2000
+        if key not in self._routes:
+            self._routes[key] = self._cheapest(plan)
+        return self._routes[key]
+
+    def _cheapest(self, plan: Plan) -> Route | None:
         routes = self.routes(np.array([plan.first]))
         launch = routes.launch_mjd2000
         early = launch + routes.tof_days + _WAIT_DAYS <= plan.window_mjd2000

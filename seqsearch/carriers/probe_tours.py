@@ -66,7 +66,7 @@ def probe_config(config: Config, catalogue: Catalogue, crew: Crew, number: int) 
 
 
 def probe_tour(config: Config, catalogue: Catalogue, crew: Crew, number: int) -> Tour:
-    """Return the tour of one probe of a crew, flown once more with its stays at the orbits' bodies.
+    """Return the tour of one probe of a crew, flown once more, with its stays at the orbits.
 
     Parameters
     ----------

@@ -63,8 +63,8 @@ def begin_carrier(config: Config, path: Path, seed: int, limits: Limits) -> int:
     write_json(path / PROVENANCE, provenance() | {"seed": seed})
     with folder_lock(path):
         say(
-            f"{config.problem.name}: {len(catalogue)} bodies from {catalogue.source}, seed {seed}, "
-            f"writing to {path}",
+            f"{config.problem.name}: {len(catalogue)} bodies from {catalogue.source}, "
+            f"seed {seed}, writing to {path}",
             Level.PROGRESS,
         )
         state = CampaignState(seed=seed, limit_s=limits.time_limit_s)
