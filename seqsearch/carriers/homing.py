@@ -35,6 +35,9 @@ _LONGEST_DAYS: Final = 500.0
 _FLIGHTS: Final = 6
 """Flight times to the end that are asked about."""
 
+_HOME_STRETCHES: Final = (1.0, 1.1, 1.2, 1.35, 1.6, 2.0)
+"""Flights to the end in units of the shortest."""
+
 _HOMEWARD_SHARE: Final = 0.5
 """Share of the longest duration after which there has to be a way to the end."""
 
@@ -235,11 +238,18 @@ class Homing:
         known = np.isfinite(values).all(axis=1)
         curves = MarginCurves.through(first, left[rows], np.where(known[:, None], values, -1.0))
         shortest = curves.shortest(np.log1p(self._base.margin_reserve))
-        # The longest flight burns least.
-        last = problem.hops(here, np.arange(n), target[:n], ready, left[rows])
-        mass = bounded_final_mass(last.legs[-1], np.exp(np.where(known, values[:, -1], -1.0)))
-        possible = known & (mass >= problem.spacecraft.m_dry)
-        days[rows] = np.where(possible, shortest, np.inf)
+        # Longer flights burn less.
+        stretches = np.array(_HOME_STRETCHES)
+        tof = np.minimum(np.where(known, shortest, np.inf)[:, None] * stretches, left[rows, None])
+        row, column = np.nonzero(np.isfinite(tof) & (tof >= shortest[:, None]))
+        flight = tof[row, column]
+        margin = np.exp(curves.take(row).log_margin(flight))
+        ways = problem.hops(here, row, target[: len(row)], ready[row], flight)
+        mass = bounded_final_mass(ways.legs[-1], margin)
+        enough = mass >= problem.spacecraft.m_dry
+        best = np.full(n, np.inf)
+        np.minimum.at(best, row[enough], flight[enough])
+        days[rows] = best
         return days
 
     def _width(self, nodes: Nodes, width: int) -> int:
