@@ -43,8 +43,16 @@ STATE: Final = "carrier-state.json"
 """Name of the file that a carrier's run goes on from."""
 
 
-def begin_carrier(config: Config, path: Path, seed: int, limits: Limits) -> int:
+def begin_carrier(
+    config: Config,
+    path: Path,
+    seed: int,
+    limits: Limits,
+    settings: CampaignSettings | None = None,
+) -> int:
     """Make a run folder, search for a carrier's flight and the tours of its craft.
+
+    Without a time limit the same seed and settings give the same result.
 
     Returns
     -------
@@ -69,7 +77,7 @@ def begin_carrier(config: Config, path: Path, seed: int, limits: Limits) -> int:
         )
         state = CampaignState(seed=seed, limit_s=limits.time_limit_s)
         state.catalogue_sha256 = catalogue_digest(catalogue)
-        return _run(path, config, problem, state, limits)
+        return _run(path, config, problem, state, limits, settings)
 
 
 def is_carrier_search(path: Path) -> bool:
@@ -119,6 +127,7 @@ def _run(
     problem: RendezvousProblem,
     state: CampaignState,
     limits: Limits,
+    settings: CampaignSettings | None = None,
 ) -> int:
     predictor = predictor_of(parse_pruner(config.search.pruner))
     if predictor is None:
@@ -139,7 +148,7 @@ def _run(
             campaign = Campaign(
                 screen,
                 problem,
-                settings=CampaignSettings(),
+                settings=settings or CampaignSettings(),
                 executor=executor,
                 workers=workers,
                 on_step=on_step,
