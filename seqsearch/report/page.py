@@ -50,14 +50,9 @@ def render(material: Material) -> str:
         f"default-src 'none'; style-src {_digest(style)}; script-src {_digest(script)}; "
         "base-uri 'none'; form-action 'none'"
     )
-    title = sections.text(f"{material.tour.rules.name}: report")
     return "\n".join(
         [
-            '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">',
-            f'<meta http-equiv="Content-Security-Policy" content="{policy}">',
-            '<meta name="viewport" content="width=device-width, initial-scale=1">',
-            '<meta name="color-scheme" content="light dark">',
-            f"<title>{title}</title>\n<style>{style}</style>\n</head>\n<body>",
+            *_opening(f"{material.tour.rules.name}: report", policy, style),
             f"<header>{sections.headline(material)}</header>\n<main>",
             *_body(material),
             "</main>\n<footer>Made by seqsearch. The page needs no network.</footer>",
@@ -67,33 +62,59 @@ def render(material: Material) -> str:
     )
 
 
+def scriptless_page(title: str, head: str, body: list[str]) -> str:
+    """Return a page of HTML parts that holds no script, and would run none."""
+    style = _asset(_STYLE)
+    policy = f"default-src 'none'; style-src {_digest(style)}; base-uri 'none'; form-action 'none'"
+    return "\n".join(
+        [
+            *_opening(title, policy, style),
+            f"<header>{head}</header>\n<main>",
+            *body,
+            "</main>\n<footer>Made by seqsearch. The page needs no network.</footer>",
+            "</body>\n</html>\n",
+        ]
+    )
+
+
+def _opening(title: str, policy: str, style: str) -> list[str]:
+    return [
+        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">',
+        f'<meta http-equiv="Content-Security-Policy" content="{policy}">',
+        '<meta name="viewport" content="width=device-width, initial-scale=1">',
+        '<meta name="color-scheme" content="light dark">',
+        f"<title>{sections.text(title)}</title>\n<style>{style}</style>\n</head>\n<body>",
+    ]
+
+
 def _body(material: Material) -> list[str]:
     tour = material.tour
     parts = [
-        _section("Sequence", sections.sequence(tour)),
-        _section("Legs", sections.legs(tour)),
+        section("Sequence", sections.sequence(tour)),
+        section("Legs", sections.legs(tour)),
     ]
     if material.flight is not None:
         parts += [
-            _section("Trajectory", _TRAJECTORY),
-            _section("Thrust and mass", _drawing("thrust") + _drawing("mass")),
-            _section("Visits and stays", _drawing("visits")),
+            section("Trajectory", _TRAJECTORY),
+            section("Thrust and mass", _drawing("thrust") + _drawing("mass")),
+            section("Visits and stays", _drawing("visits")),
         ]
     if material.ranks:
         counts = f"<details><summary>Numbers</summary>{sections.ranks(material)}</details>"
-        parts.append(_section("The beam, rank by rank", _RANKS + counts))
+        parts.append(section("The beam, rank by rank", _RANKS + counts))
     if any(line.margin is not None for line in material.candidates):
-        parts.append(_section("Candidates kept and pruned", _CANDIDATES))
+        parts.append(section("Candidates kept and pruned", _CANDIDATES))
     if material.audit:
-        parts.append(_section("Audit", sections.audit(material)))
+        parts.append(section("Audit", sections.audit(material)))
     if material.provenance:
-        parts.append(_section("Seed and versions", sections.provenance(material)))
+        parts.append(section("Seed and versions", sections.provenance(material)))
     if material.config:
-        parts.append(_section("Settings", sections.settings(material)))
+        parts.append(section("Settings", sections.settings(material)))
     return parts
 
 
-def _section(title: str, content: str) -> str:
+def section(title: str, content: str) -> str:
+    """Return a part of the page with its heading."""
     return f"<section><h2>{title}</h2>{content}</section>"
 
 

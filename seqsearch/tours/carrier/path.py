@@ -63,7 +63,7 @@ class CarrierPath:
                 f"epoch {epochs.min():.6f} MJD2000, expected none before the launch at "
                 f"{self.t_mjd2000[0]:.6f}"
             )
-        return _coasted(self.after[row], epochs - self.t_mjd2000[row], self._mu)
+        return coasted(self.after[row], epochs - self.t_mjd2000[row], self._mu)
 
     def orbit(self, t_mjd2000: float, *, body_id: int, name: str = "MOTHER") -> TourBody:
         """Return the orbit that the carrier follows after an epoch, as a body of a tour.
@@ -151,7 +151,7 @@ def fly_carrier(carrier: Carrier) -> CarrierPath:
     alone[0] = mass[0] - aboard_kg
     for k, event in enumerate(carrier.events[1:], 1):
         days = epochs[k] - epochs[k - 1]
-        before[k] = after[k] = _coasted(after[k - 1 : k], np.array([days]), rules.mu_m3_s2)[0]
+        before[k] = after[k] = coasted(after[k - 1 : k], np.array([days]), rules.mu_m3_s2)[0]
         mass[k] = mass[k - 1]
         match event:
             case CarrierImpulse(dv_m_s=dv):
@@ -172,9 +172,10 @@ def mass_after(rules: CarrierRules, mass_kg: float, dv_m_s: float) -> float:
     return float(mass_kg * np.exp(-dv_m_s / (rules.isp_s * rules.g0_m_s2)))
 
 
-def _coasted(states: _Array, days: _Array, mu: float) -> _Array:
+def coasted(states: _Array, days: _Array, mu: float) -> _Array:
+    """Return (n, 6) states after n times of coasting, from (n, 6) states; m, m/s and days."""
     # Imported here: compiled kernels take a moment to load.
     from feasibility.orbits.kepler_kernels import propagate_batch
 
-    coasted: _Array = propagate_batch(np.ascontiguousarray(states), days * DAY_S, mu)
-    return coasted
+    moved: _Array = propagate_batch(np.ascontiguousarray(states), days * DAY_S, mu)
+    return moved

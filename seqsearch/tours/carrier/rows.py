@@ -62,7 +62,9 @@ def write_carrier_rows(folder: Path, carrier: Carrier, craft: Mapping[int, Traje
     for number, trajectory in craft.items():
         if not trajectory.continuous:
             raise InputError(f"P{number}: impulses, expected continuous thrust; refine it first")
-        write_rows(_named(trajectory), folder / f"P{number}.TXT", title=f"craft {number}")
+        write_rows(
+            named_at_carrier(trajectory), folder / f"P{number}.TXT", title=f"craft {number}"
+        )
     write_text(folder / "M.TXT", _log(docked))
     return docked
 
@@ -99,7 +101,7 @@ def _docked(event: CarrierEvent, craft: Mapping[int, Trajectory]) -> CarrierEven
     return event
 
 
-def _named(trajectory: Trajectory) -> Trajectory:
+def named_at_carrier(trajectory: Trajectory) -> Trajectory:
     """Return a trajectory whose ends have the carrier's name."""
     phases = list(trajectory.phases)
     phases[0] = _renamed(phases[0], MOTHER, phases[0].end)
@@ -119,11 +121,12 @@ def _log(carrier: Carrier) -> str:
     ]
     for event, state, mass in zip(carrier.events, path.after, path.mass_kg, strict=True):
         numbers = " ".join(f"{value:.16e}" for value in (*(state / 1e3), mass))
-        lines.append(f"{event.t_mjd2000 + MJD2000_MJD:.17g} {numbers} {_label(event)}")
+        lines.append(f"{event.t_mjd2000 + MJD2000_MJD:.17g} {numbers} {event_label(event)}")
     return "\n".join(lines) + "\n"
 
 
-def _label(event: CarrierEvent) -> str:
+def event_label(event: CarrierEvent) -> str:
+    """Return what ``M.TXT`` calls an event."""
     match event:
         case CarrierLaunch():
             return "LAUNCH"
