@@ -113,18 +113,17 @@ def _bodies(
 ) -> "dict[str, TourBody]":
     """Return the bodies that the phases name, from the table and from the rules."""
     from seqsearch.core.recording import tour_body
-    from seqsearch.tours.labels import launch_planet, planet_label
+    from seqsearch.tours.labels import named_bodies
 
-    planet = launch_planet(rules)
-    bodies = {} if planet is None else {planet_label(planet): planet}
+    bodies = named_bodies(rules)
+    others = "".join(f" or {name}" for name in bodies)
     for phase in trajectory.phases:
         for name in {phase.start, phase.end} - bodies.keys():
             try:
                 bodies[name] = tour_body(table, int(table.rows_of([int(name)])[0]))
             except ValueError:
                 raise InputError(
-                    f"{phase}: no body {name!r}, expected an id of {table.source}"
-                    + (f" or {planet_label(planet)}" if planet is not None else "")
+                    f"{phase}: no body {name!r}, expected an id of {table.source}{others}"
                 ) from None
     return bodies
 

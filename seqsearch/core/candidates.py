@@ -95,19 +95,19 @@ def near_pairs(
     near = _with_required(problem, neighbours.query(here.row, here.t_ready_mjd2000, n_near))
     departure = here.t_ready_mjd2000[:, None] + np.asarray(settings.departure_delays_days)
     left = problem.days_left(here, departure)
-    allowed = problem.may_visit(here, near)[:, :, None] & (left >= settings.tof_days_min)[:, None]
+    here_to_near = problem.may_visit(here, near) & (near >= 0)
+    allowed = here_to_near[:, :, None] & (left >= settings.tof_days_min)[:, None]
     i, j, d = np.nonzero(allowed)
     return Pairs(block[i], near[i, j], departure[i, d], left[i, d])
 
 
 def _with_required(problem: Problem, near: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Return targets (n, t) with the bodies that a tour has to visit, wherever they are."""
+    """Return targets (n, t) with the bodies that a tour has to visit, -1 for those near anyway."""
     ending = ending_of(problem)
     if ending is None or len(ending.required) == 0:
         return near
     required = np.broadcast_to(ending.required, (len(near), len(ending.required)))
     twice = (required[:, :, None] == near[:, None, :]).any(axis=2)
-    # A target of no body at all: no rule allows the body that a node is at.
     return np.column_stack([near, np.where(twice, -1, required)])
 
 

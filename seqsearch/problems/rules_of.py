@@ -32,9 +32,9 @@ def rules_of(config: Config, tour: Tour, catalogue: Catalogue | None = None) -> 
     if catalogue is None:
         mission = config.mission
         end = () if mission.end_id is None else (mission.end_id,)
-        named = (*mission.start_ids, *mission.sequence, *mission.must_visit, *end)
+        asked = (*mission.start_ids, *mission.sequence, *mission.must_visit, *end)
         ours = {body.id for body in config.bodies}
-        catalogue = _bodies_of(tour, tuple(body for body in named if body not in ours), ours)
+        catalogue = _bodies_of(tour, tuple(body for body in asked if body not in ours), ours)
         # Which bodies were excluded plays no part in the rules.
         table = msgspec.structs.replace(config.catalogue, exclude_ids=())
         config = msgspec.structs.replace(config, catalogue=table)

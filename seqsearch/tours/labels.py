@@ -14,11 +14,18 @@ def launch_planet(rules: TourRules) -> TourBody | None:
 
 
 def body_label(tour: Tour, body_id: int) -> str:
-    """Return the id of a body as text, or a name such as ``EARTH`` for a launch planet."""
-    planet = launch_planet(tour.rules)
-    if planet is not None and planet.id == body_id:
-        return planet_label(planet)
+    """Return the id of a body as text, or a name such as ``EARTH`` for one without a score."""
+    for name, body in named_bodies(tour.rules).items():
+        if body.id == body_id:
+            return name
     return str(body_id)
+
+
+def named_bodies(rules: TourRules) -> dict[str, TourBody]:
+    """Return the bodies that rows call by their names: the launch planet, and those unscored."""
+    planet = launch_planet(rules)
+    bodies = (*(() if planet is None else (planet,)), *(rules.unscored or ()))
+    return {planet_label(body): body for body in bodies}
 
 
 def planet_label(planet: TourBody) -> str:

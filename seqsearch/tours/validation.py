@@ -61,6 +61,8 @@ def _of_rules(rules: TourRules) -> Iterator[str]:
     yield from _outside("rules: m_dry_kg", rules.m_dry_kg, 0.0, _MAX_MASS_KG)
     for name, least, most in (("mu_m3_s2", 1e10, 1e25), ("g0_m_s2", 1.0, 100.0)):
         yield from _outside(f"rules: {name}", getattr(rules, name), least, most)
+    for body in rules.unscored or ():
+        yield from _of_body(body)
 
 
 def _of_body(body: TourBody) -> Iterator[str]:

@@ -77,7 +77,7 @@ class WayHomeTable:
         unknown = np.setdiff1d(wanted, self._keys, assume_unique=True)
         if len(unknown):
             self._learn(unknown)
-        place = np.searchsorted(self._keys, wanted)[where.ravel()]
+        place = np.asarray(np.searchsorted(self._keys, wanted))[where.ravel()]
         return self._log_m_star[place], self._delta_v[place]
 
     def _learn(self, keys: NDArray[np.int64]) -> None:
@@ -95,7 +95,8 @@ class WayHomeTable:
         """Return what `at` returns, of some keys."""
         n, k = len(keys), len(TOFS_DAYS)
         row = (keys >> 20).astype(np.intp)
-        epoch = GRID_DAYS * ((keys & ((1 << 20) - 1)) - _OFFSET)
+        cell = ((keys & ((1 << 20) - 1)) - _OFFSET).astype(np.float64)
+        epoch = GRID_DAYS * cell
         nodes = Nodes.at_start(row, epoch, np.full(n, self._mass))
         # One visit done: on some problems the first hop is of another kind than the rest.
         nodes = replace(

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from feasibility import InputError, Spacecraft
+from seqsearch.problems.extra_bodies import BodyTable
 from seqsearch.problems.problem_file import (
     CatalogueTable,
     Config,
@@ -170,6 +171,7 @@ def test_the_page_on_problems_names_every_key_and_its_example_can_be_read(tmp_pa
         "spacecraft": SpacecraftTable,
         "mission": MissionTable,
         "catalogue": CatalogueTable,
+        "bodies": BodyTable,
         "fleet": FleetTable,
         "search": SearchSettings,
         "search.frontier": FrontierSettings,
@@ -184,7 +186,8 @@ def test_the_page_on_problems_names_every_key_and_its_example_can_be_read(tmp_pa
     }
     assert parts == {"frontier", "scouts", "audit"}
     for name, table in tables.items():
-        section = page.split(f"\n`[{name}]`")[1].split("\n`[")[0].split("\n## ")[0]
+        heading = "[[bodies]]" if name == "bodies" else f"[{name}]"
+        section = page.split(f"\n`{heading}`")[1].split("\n`[")[0].split("\n## ")[0]
         keys = {field.name for field in msgspec.structs.fields(table)}
         keys -= parts if name == "search" else set()
         documented = set(
