@@ -149,7 +149,7 @@ class Campaign:
         self._executor = executor
         self._at_once = max(2, 2 * workers)
         self._on_step = on_step
-        self._common = executor and shared(executor, pickle.dumps(self._context))
+        self._common: Any = executor and shared(executor, pickle.dumps(self._context))
 
     def run(self, state: CampaignState) -> None:
         """Go on from a state to the end, or until the time is up."""

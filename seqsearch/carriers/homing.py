@@ -208,7 +208,7 @@ class Homing:
         days = self._days_home(nodes.take(rows), end)
         order = np.argsort(elapsed[rows] + days, kind="stable")
         sets: set[tuple[int, ...]] = set()
-        tours = []
+        tours: list[Homecoming] = []
         for k in order:
             kind = tuple(sorted(nodes.visited[rows[k]].tolist()))
             if not np.isfinite(days[k]) or len(tours) == count:
@@ -235,7 +235,7 @@ class Homing:
         ready = here.t_ready_mjd2000
         hops = problem.hops(here, parent, target, ready[parent], times.ravel())
         values = log_margin(self._quick, hops).reshape(n, _FLIGHTS)
-        known = np.isfinite(values).all(axis=1)
+        known: NDArray[np.bool_] = np.asarray(np.isfinite(values).all(axis=1))
         curves = MarginCurves.through(first, left[rows], np.where(known[:, None], values, -1.0))
         shortest = curves.shortest(np.log1p(self._base.margin_reserve))
         # Longer flights burn less.

@@ -131,15 +131,16 @@ def change_orbit(
             bounds=[(0.0, 0.85), (_SHORTEST, 1.0)],
             options={"maxfev": _EVALUATIONS, "xatol": 1e-5, "fatol": 1e-3},
         )
-        leave, arrive = found.x
+        leave, arrive = map(float, found.x)
         if arrive - leave >= 0.5 * _SHORTEST:
             way = _arc(catalogue, first, second, begin + leave * days, begin + arrive * days)
-            best = min(best, way, key=lambda way: way.delta_v)
+            best = way if way.delta_v < best.delta_v else best
     return best
 
 
 def _arc(catalogue: Catalogue, first: int, second: int, t_dep: float, t_arr: float) -> Change:
     """Return the cheapest Lambert arc between two epochs; infinite impulses for none."""
+    t_dep, t_arr = float(t_dep), float(t_arr)
     there = catalogue.states_at([first], t_dep)
     goal = catalogue.states_at([second], t_arr)
     if t_arr - t_dep < 1.0:
