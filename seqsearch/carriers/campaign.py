@@ -271,13 +271,14 @@ def _improved(context: _Context, crew: Crew, number: int, seed: int) -> Crew | N
     rng = np.random.default_rng(seed)
     settings = HomingSettings(
         width=int(_WIDE * rng.uniform(0.5, 3.0)),
-        propellant_weight=float(rng.uniform(0.05, 0.5)),
+        propellant_weight=float(rng.uniform(0.2, 1.5)),
         distance_weight=float(rng.uniform(0.05, 0.6)),
     )
     kind = rng.random()
     if kind < _ANEW:
         offset, closed = float(rng.uniform(0.0, 60.0)), crew.closed(number)
-        flight = find_probe(screen, problem, crew.plan, closed, settings, offset)
+        weights = (settings.propellant_weight,)
+        flight = find_probe(screen, problem, crew.plan, closed, settings, offset, weights)
     elif kind < _ANEW + _REBUILT:
         kept = int(rng.integers(1, len(crew.flights[number].itinerary) - 2))
         flight = rebuilt_probe(screen, problem, crew, number, kept, settings)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.classifier.predictor import LegPredictor
-from seqsearch.carriers.homing import DAYS_PER_VISIT, HomingSettings
+from seqsearch.carriers.homing import DAYS_PER_VISIT, Homecoming, HomingSettings
 from seqsearch.carriers.plans import SPREAD_DAYS, STAY_DAYS, Plan, Screen
 from seqsearch.core.nodes import Nodes
 from seqsearch.polish import PolishSettings, polish
@@ -33,9 +33,13 @@ STAY_MARGIN_DAYS: Final = 0.002
 WAIT_DAYS: Final = STAY_DAYS + TOUCH_DAYS + STAY_MARGIN_DAYS
 """What it costs a probe to stay at such an asteroid."""
 
+WEIGHTS: Final = (0.4, 0.9)
+"""Weights of propellant in the beams for one probe: which of them balances time and propellant
+depends on the orbits."""
+
 _POLISH: Final = PolishSettings(rounds=2, moves_per_round=4)
 _ITERATIONS: Final = 12
-_TRIED: Final = 6
+_TRIED: Final = 8
 """Predicted tours of which the timetables are made good until one fits."""
 
 
@@ -128,15 +132,30 @@ def find_probe(
     avoid: Sequence[int],
     settings: HomingSettings,
     offset_days: float = 0.0,
+    weights: tuple[float, ...] = WEIGHTS,
 ) -> Flight | None:
     """Return the best tour of one probe that can be flown in time; None for none."""
     own = probe_problem(problem, plan, problem.max_duration_days)
-    found: Flight | None = None
-    tours = screen.tours(plan, replace(settings, results=_TRIED), tuple(avoid), offset_days)
-    for tour in tours:
+    tours = [
+        tour
+        for weight in weights
+        for tour in screen.tours(
+            plan, replace(settings, propellant_weight=weight), tuple(avoid), offset_days
+        )
+    ]
+    return _best_fitted(own, tours, None)
+
+
+def _best_fitted(
+    problem: RendezvousProblem, tours: list[Homecoming], found: Flight | None
+) -> Flight | None:
+    """Return the best of predicted tours that can be flown in time, or what there is already."""
+    different = {tuple(tour.itinerary.rows.tolist()): tour for tour in reversed(tours)}
+    ordered = sorted(different.values(), key=lambda tour: (-tour.visits, tour.duration_days))
+    for tour in ordered[:_TRIED]:
         if found is not None and tour.visits < len(found.itinerary) - 1:
-            continue
-        flight = fitted(own, tour.itinerary)
+            break
+        flight = fitted(problem, tour.itinerary)
         if flight is not None and (found is None or _better(flight, found)):
             found = flight
     return found
@@ -173,14 +192,9 @@ def rebuilt_probe(
     plan = crew.plan
     avoid = np.unique([plan.first, plan.second, *crew.closed(number)])
     own = probe_problem(problem, plan, problem.max_duration_days)
-    best = before
-    found = screen.homing.run(node, plan.second, avoid, replace(settings, results=_TRIED))
-    for tour in found:
-        if tour.visits < len(best.itinerary) - 1:
-            continue
-        flight = fitted(own, joined(head, tour.itinerary))
-        if flight is not None and _better(flight, best):
-            best = flight
+    tails = screen.homing.run(node, plan.second, avoid, settings)
+    tours = [replace(tail, itinerary=joined(head, tail.itinerary)) for tail in tails]
+    best = _best_fitted(own, tours, before)
     return None if best is before else best
 
 

@@ -27,8 +27,9 @@ from seqsearch.settings import SearchSettings
 _Array = NDArray[np.float64]
 _Index = NDArray[np.intp]
 
-DAYS_PER_VISIT: Final = 170.0
-"""What a visit costs in time, by which tours of different length compare."""
+DAYS_PER_VISIT: Final = 300.0
+"""Time that is worth a visit. A visit takes 170 days; but tours with time to spare have mostly
+burnt their propellant for it."""
 
 _SHORTEST_DAYS: Final = 40.0
 _LONGEST_DAYS: Final = 500.0
@@ -69,13 +70,13 @@ class HomingSettings:
     distance_weight : float
         What the distance from the end counts, at the end of the time.
     results : int
-        Most tours that are returned.
+        Most tours of each number of visits that are returned.
     """
 
     width: int = 60
-    propellant_weight: float = 0.2
+    propellant_weight: float = 0.6
     distance_weight: float = 0.2
-    results: int = 10
+    results: int = 3
 
 
 @final
@@ -131,7 +132,7 @@ class Homing:
     def run(
         self, starts: Nodes, end: int, avoid: _Index, settings: HomingSettings
     ) -> list[Homecoming]:
-        """Return the best tours from starts to an end.
+        """Return tours from starts to an end, those with most visits first, the shortest of them.
 
         Parameters
         ----------
@@ -153,9 +154,7 @@ class Homing:
                 break
             ranks.append(_numbered(children))
             found += self._homecomings(ranks, end, settings.results)
-        duration = self._problem.max_duration_days
-        found.sort(key=lambda tour: -tour.value(duration))
-        return found[: settings.results]
+        return sorted(found, key=lambda tour: (-tour.visits, tour.duration_days))
 
     def _children(
         self,

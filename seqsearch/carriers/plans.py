@@ -167,7 +167,7 @@ class Screen:
             plan = Plan(row, row, float(window), 0.0)
             tours = self.tours(plan, HomingSettings(width=width, results=1))
             if tours:
-                plans.append(replace(plan, value=tours[0].value(self.duration_days)))
+                plans.append(replace(plan, value=self._value(tours)))
         return plans
 
     def seconds(self, plan: Plan, width: int) -> list[Plan]:
@@ -186,7 +186,7 @@ class Screen:
             other = replace(plan, second=int(row))
             tours = self.tours(other, HomingSettings(width=width, results=1))
             if tours:
-                plans.append(replace(other, value=tours[0].value(self.duration_days)))
+                plans.append(replace(other, value=self._value(tours)))
         return plans
 
     def tours(
@@ -203,6 +203,9 @@ class Screen:
         )
         closed = np.unique([plan.first, plan.second, *avoid])
         return self.homing.run(starts, plan.second, closed, settings)
+
+    def _value(self, tours: list[Homecoming]) -> float:
+        return max(tour.value(self.duration_days) for tour in tours)
 
     def route(self, plan: Plan) -> Route | None:
         """Return the cheapest way to the first orbit that is in time; None for none."""
