@@ -33,6 +33,9 @@ from seqsearch.tours.trajectory import Phase, Trajectory
 MOTHER: Final = "MOTHER"
 """What rows call the carrier."""
 
+_DIGITS: Final = 13
+"""Of the rows of craft: some centimetres, and half the size of all digits."""
+
 
 def write_carrier_rows(folder: Path, carrier: Carrier, craft: Mapping[int, Trajectory]) -> Carrier:
     """Write the files of a carrier and its craft into a folder.
