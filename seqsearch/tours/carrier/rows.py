@@ -34,7 +34,7 @@ MOTHER: Final = "MOTHER"
 """What rows call the carrier."""
 
 _DIGITS: Final = 13
-"""Of the rows of craft: some centimetres, and half the size of all digits."""
+"""Of the rows of craft: some centimetres, in two thirds of the bytes of all digits."""
 
 
 def write_carrier_rows(folder: Path, carrier: Carrier, craft: Mapping[int, Trajectory]) -> Carrier:
@@ -66,7 +66,10 @@ def write_carrier_rows(folder: Path, carrier: Carrier, craft: Mapping[int, Traje
         if not trajectory.continuous:
             raise InputError(f"P{number}: impulses, expected continuous thrust; refine it first")
         write_rows(
-            named_at_carrier(trajectory), folder / f"P{number}.TXT", title=f"craft {number}"
+            named_at_carrier(trajectory),
+            folder / f"P{number}.TXT",
+            title=f"craft {number}",
+            digits=_DIGITS,
         )
     write_text(folder / "M.TXT", _log(docked))
     return docked
