@@ -33,6 +33,9 @@ from seqsearch.tours.trajectory import Phase, Trajectory
 MOTHER: Final = "MOTHER"
 """What rows call the carrier."""
 
+_DIGITS: Final = 13
+"""Of the rows of craft: some centimetres, in two thirds of the bytes of all digits."""
+
 
 def write_carrier_rows(folder: Path, carrier: Carrier, craft: Mapping[int, Trajectory]) -> Carrier:
     """Write the files of a carrier and its craft into a folder.
@@ -63,7 +66,10 @@ def write_carrier_rows(folder: Path, carrier: Carrier, craft: Mapping[int, Traje
         if not trajectory.continuous:
             raise InputError(f"P{number}: impulses, expected continuous thrust; refine it first")
         write_rows(
-            named_at_carrier(trajectory), folder / f"P{number}.TXT", title=f"craft {number}"
+            named_at_carrier(trajectory),
+            folder / f"P{number}.TXT",
+            title=f"craft {number}",
+            digits=_DIGITS,
         )
     write_text(folder / "M.TXT", _log(docked))
     return docked

@@ -53,7 +53,9 @@ class RowsExporter:
         write_rows(flight.trajectory, path, title=flight.tour.one_line())
 
 
-def write_rows(trajectory: Trajectory, path: Path, *, title: str = "") -> None:
+def write_rows(
+    trajectory: Trajectory, path: Path, *, title: str = "", digits: int | None = None
+) -> None:
     """Write a trajectory of continuous thrust, whole or not at all.
 
     Parameters
@@ -64,12 +66,16 @@ def write_rows(trajectory: Trajectory, path: Path, *, title: str = "") -> None:
         The file.
     title : str
         A line for people.
+    digits : int, optional
+        Significant digits of all numbers but the epochs; default: so many that the numbers come
+        back as they were.
 
     Raises
     ------
     InputError
         The file cannot be written.
     """
+    form = ".16e" if digits is None else f".{digits}g"
     with atomic_path(path) as temporary, temporary.open("w", encoding="utf-8") as file:
         if title:
             file.write(f"# {title}\n")
@@ -78,14 +84,14 @@ def write_rows(trajectory: Trajectory, path: Path, *, title: str = "") -> None:
         )
         for number, phase in enumerate(trajectory.phases, 1):
             file.write(f"# phase {number}: {phase.start} -> {phase.end}\n")
-            file.writelines(_lines(phase))
+            file.writelines(_lines(phase, form))
 
 
-def _lines(phase: Phase) -> Iterator[str]:
+def _lines(phase: Phase, form: str) -> Iterator[str]:
     epochs = phase.t_mjd2000 + MJD2000_MJD
     table = np.column_stack([epochs, phase.states, phase.mass_kg, phase.thrust_n]) / _UNITS
     for row in table.tolist():
-        numbers = " ".join(f"{number:.16e}" if number else "0" for number in row[1:])
+        numbers = " ".join(f"{number:{form}}" if number else "0" for number in row[1:])
         yield f"{row[0]:.17g} {numbers}\n"
 
 

@@ -47,7 +47,9 @@ def test_a_run_gives_the_same_page_as_its_files(files, tmp_path):
 def test_names_from_files_are_shown_and_never_obeyed(files, tmp_path):
     evil = "<img/src=x>"
     file = files / "P1.TXT"
-    file.write_text(file.read_text().replace(" 101\n", f" {evil}\n").replace(": 101 ", f": {evil} "))
+    file.write_text(
+        file.read_text().replace(" 101\n", f" {evil}\n").replace(": 101 ", f": {evil} ")
+    )
     page = render(carrier_flight(files))
     assert evil not in page
     assert "&lt;img/src=x&gt;" in page

@@ -40,7 +40,7 @@ def test_the_guide_lists_every_format_and_the_command_too(capsys):
 
     text = (GUIDES / "export.md").read_text(encoding="utf-8")
     listed = set(re.findall(r"^\| `(\w+)` \|", text, re.M))
-    assert listed == {*exporters(), "graphml"}
+    assert listed == {*exporters(), "graphml", "carrier"}
     with pytest.raises(SystemExit):
         main(["export", "--help"])
     shown = capsys.readouterr().out
