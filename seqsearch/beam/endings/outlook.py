@@ -138,8 +138,8 @@ class EndOutlook:
         pick = (np.arange(n), *np.divmod(best, tof.shape[2]))
         return Homecoming(
             weight=np.ones(n),
-            possible=possible.reshape(n, -1).any(axis=1),
-            surely=surely.reshape(n, -1).any(axis=1),
+            possible=np.asarray(possible).reshape(n, -1).any(axis=1),
+            surely=np.asarray(surely).reshape(n, -1).any(axis=1),
             t_arr_mjd2000=nodes.t_ready_mjd2000 + delay[pick[:2]] + tof[pick],
             mass=final[pick],
         )
