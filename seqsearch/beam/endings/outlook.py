@@ -6,6 +6,7 @@ from typing import Final, final
 import numpy as np
 from numpy.typing import NDArray
 
+from feasibility.arrays import StructOfArrays
 from feasibility.classifier.predictor import LegPredictor, bounded_burn
 from feasibility.constants import DAY_S
 from seqsearch.beam.endings.table import GRID_DAYS, TOFS_DAYS, WayHomeTable
@@ -38,7 +39,7 @@ _BURN_WEIGHT: Final = 0.5
 
 @final
 @dataclass(frozen=True, eq=False)
-class Homecoming:
+class Homecoming(StructOfArrays):
     """What the ends of n nodes look like.
 
     Attributes
@@ -82,9 +83,25 @@ class EndOutlook:
         self.ending = ending
         self._problem = problem
         self._table = WayHomeTable(problem, ending, predictor, threads)
+        self._last: tuple[Nodes, Homecoming] | None = None
+
+    def hopeful(self, nodes: Nodes) -> NDArray[np.intp]:
+        """Return the positions of nodes from which there may be a way to the end."""
+        return np.flatnonzero(self.homecoming(nodes).possible)
+
+    def taken(self, nodes: Nodes, rows: NDArray[np.intp]) -> Nodes:
+        """Return nodes at positions, about which `homecoming` need not look again."""
+        some = nodes.take(rows)
+        self._last = some, self.homecoming(nodes).take(rows)
+        return some
 
     def homecoming(self, nodes: Nodes) -> Homecoming:
         """Return how each of n nodes comes to the end."""
+        if self._last is None or self._last[0] is not nodes:
+            self._last = nodes, self._looked(nodes)
+        return self._last[1]
+
+    def _looked(self, nodes: Nodes) -> Homecoming:
         n = len(nodes)
         left = self.ending.days_left(nodes, nodes.t_ready_mjd2000[:, None])[:, 0]
         missing = self.ending.missing(nodes)
