@@ -20,10 +20,11 @@ _Flags = NDArray[np.bool_]
 _LATER: Final = (1, 2, 4)
 """Departures that are looked at besides the first possible one, in steps of the grid."""
 
-_HORIZON_DAYS: Final = 900.0
-_NEAR_DAYS: Final = 400.0
+_HORIZON_DAYS: Final = 500.0
+_NEAR_DAYS: Final = 200.0
 """With more time left than the first, the way home plays no part; with less than the second, it
-counts in full."""
+counts in full. On orbits in the main belt, scouts found as much with 420 to 600 and
+150 to 300 days, and less with 900 and 400, or 1400 and 800."""
 
 _MUST_DAYS: Final = 500.0
 """With less time left than this, there has to be a way home from where a node is."""
@@ -155,8 +156,8 @@ class EndOutlook:
         pick = (np.arange(n), *np.divmod(best, tof.shape[2]))
         return Homecoming(
             weight=np.ones(n),
-            possible=np.asarray(possible).reshape(n, -1).any(axis=1),
-            surely=np.asarray(surely).reshape(n, -1).any(axis=1),
+            possible=np.asarray(possible.reshape(n, -1).any(axis=1), dtype=np.bool_),
+            surely=np.asarray(surely.reshape(n, -1).any(axis=1), dtype=np.bool_),
             t_arr_mjd2000=nodes.t_ready_mjd2000 + delay[pick[:2]] + tof[pick],
             mass=final[pick],
         )
