@@ -124,3 +124,13 @@ def test_a_chain_that_does_not_fit_says_what_it_lacks(run):
     found = whole_chain(problem, ending_of(problem), tour, sequence, MimaPredictor())
     assert found.tour is None
     assert "days instead of 500.0" in found.lacks
+
+
+def test_a_run_without_a_way_home_says_so_and_can_be_read(tmp_path):
+    problem = tmp_path / "short.toml"
+    problem.write_text(_text().replace("max_duration_days = 1000", "max_duration_days = 130"))
+    out = tmp_path / "run"
+    assert main(["run", str(problem), "--out", str(out), "--workers", "1"]) == 0
+    assert read_tour(out / "sequence.json").legs == ()
+    assert main(["verify", str(out)]) == 1
+    assert main(["report", str(out)]) == 0
