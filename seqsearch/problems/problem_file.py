@@ -3,7 +3,7 @@
 import re
 from functools import cache
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal, final
+from typing import Annotated, Any, Literal, final
 
 import msgspec
 import numpy as np
@@ -18,25 +18,11 @@ from feasibility.orbits.spk.files import is_kernel
 from feasibility.runtime.toml_file import convert_table, parse_toml, read_toml_text
 from seqsearch.core.problem import Problem
 from seqsearch.problems.extra_bodies import BodyTable, extra_bodies
+from seqsearch.problems.old_keys import upgraded_search
 from seqsearch.problems.registry import ProblemPlugin, builtin_problems, plugins
 from seqsearch.problems.rendezvous import RendezvousProblem
 from seqsearch.settings import SearchSettings
 from seqsearch.tours.dates import mjd_of
-
-_MOVED: Final = {
-    "frontier": ("frontier", "kind"),
-    "slice_days": ("frontier", "slice_days"),
-    "nominal_visits": ("frontier", "nominal_visits"),
-    "max_per_parent": ("frontier", "max_per_parent"),
-    "max_per_cell": ("frontier", "max_per_cell"),
-    "cell_days": ("frontier", "cell_days"),
-    "max_start_share": ("frontier", "max_start_share"),
-    "scout_generations": ("scouts", "generations"),
-    "scout_share": ("scouts", "share"),
-    "scout_width": ("scouts", "width"),
-    "audit_per_rank": ("audit", "per_rank"),
-}
-"""Keys of ``[search]`` in files of version 0.1, and where they are now."""
 
 
 class _Table(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -193,7 +179,7 @@ def read_config(problem: str) -> Config:
 def _decode(text: str, label: str) -> Config:
     plain = parse_toml(text, label)
     if isinstance(plain.get("search"), dict):
-        plain["search"] = _upgraded(plain["search"], label)
+        plain["search"] = upgraded_search(plain["search"], label)
     mission = plain.get("mission")
     if isinstance(mission, dict) and isinstance(mission.get("first_departure_mjd"), list):
         # TOML has dates of its own, and people write them as texts too.
@@ -205,23 +191,6 @@ def _decode(text: str, label: str) -> Config:
         if isinstance(body, dict) and "epoch_mjd" in body:
             body["epoch_mjd"] = mjd_of(body["epoch_mjd"], f"{label}: bodies[{number}].epoch_mjd")
     return convert_table(plain, _whole(), label)
-
-
-def _upgraded(search: dict[str, Any], label: str) -> dict[str, Any]:
-    """Return a table ``[search]`` with the keys of version 0.1 where they are now."""
-    upgraded = {
-        key: value for key, value in search.items() if key not in _MOVED or isinstance(value, dict)
-    }
-    for key in search.keys() - upgraded.keys():
-        table, name = _MOVED[key]
-        inner = dict(upgraded.get(table, {}))
-        if name in inner:
-            raise InputError(
-                f"{label}: [search] has {key!r} of version 0.1 and [search.{table}] {name!r}, "
-                "expected the second alone"
-            )
-        upgraded[table] = inner | {name: search[key]}
-    return upgraded
 
 
 def override(config: Config, **changes: Any) -> Config:

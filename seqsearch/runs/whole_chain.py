@@ -17,6 +17,7 @@ _TOFS_DAYS: Final = np.geomspace(50.0, 350.0, 30)
 """Flight times that are looked at for a leg that the search did not reach."""
 
 _ITERATIONS: Final = 80
+_ATTEMPTS: Final = 2
 
 
 @final
@@ -72,14 +73,17 @@ def whole_chain(
     while base is None or len(base.rows) < len(rows):
         base = _lengthened(problem, base, rows, mass, predictor)
         mass = max(0.9 * mass, problem.spacecraft.m_dry)
-    retimed = retime(
-        problem, base.ended(problem, ending, predictor, mass), max_iterations=_ITERATIONS
-    )
-    if retimed is None:
-        return WholeChain(None, "a leg has no solution at any of the epochs that were tried")
-    if retimed.flight.keeps_rules(problem):
-        return WholeChain(retimed.flight.to_tour(problem))
-    return WholeChain(None, _lacks(problem, retimed.flight))
+    itinerary = base.ended(problem, ending, predictor, mass)
+    lacks = "a leg without a solution at all epochs that were tried"
+    # Begun anew where the first attempt ended, retiming forgets models of timetables far away.
+    for _ in range(_ATTEMPTS):
+        retimed = retime(problem, itinerary, max_iterations=_ITERATIONS)
+        if retimed is None:
+            break
+        if retimed.flight.keeps_rules(problem):
+            return WholeChain(retimed.flight.to_tour(problem))
+        itinerary, lacks = retimed.flight.itinerary, _lacks(problem, retimed.flight)
+    return WholeChain(None, lacks)
 
 
 def _flown_part(problem: Problem, tour: Tour, count: int) -> tuple[Itinerary | None, float]:

@@ -72,8 +72,8 @@ class HomeboundFrontier:
         """Return the positions of the best nodes that can come to the end."""
         if len(nodes) == 0:
             return self._base.admit(nodes, width, spare)
-        rows = np.flatnonzero(self._outlook.homecoming(nodes).possible)
-        return rows[self._base.admit(nodes.take(rows), width, spare)]
+        rows = self._outlook.hopeful(nodes)
+        return rows[self._base.admit(self._outlook.taken(nodes, rows), width, spare)]
 
     def push(self, nodes: Nodes, /) -> None:
         """Take in nodes."""

@@ -6,6 +6,7 @@ from typing import Final, final
 import numpy as np
 from numpy.typing import NDArray
 
+from feasibility.arrays import StructOfArrays
 from feasibility.classifier.predictor import LegPredictor, bounded_burn
 from feasibility.constants import DAY_S
 from seqsearch.beam.endings.table import GRID_DAYS, TOFS_DAYS, WayHomeTable
@@ -19,10 +20,11 @@ _Flags = NDArray[np.bool_]
 _LATER: Final = (1, 2, 4)
 """Departures that are looked at besides the first possible one, in steps of the grid."""
 
-_HORIZON_DAYS: Final = 900.0
-_NEAR_DAYS: Final = 400.0
+_HORIZON_DAYS: Final = 500.0
+_NEAR_DAYS: Final = 200.0
 """With more time left than the first, the way home plays no part; with less than the second, it
-counts in full."""
+counts in full. On orbits in the main belt, scouts found as much with 420 to 600 and
+150 to 300 days, and less with 900 and 400, or 1400 and 800."""
 
 _MUST_DAYS: Final = 500.0
 """With less time left than this, there has to be a way home from where a node is."""
@@ -38,7 +40,7 @@ _BURN_WEIGHT: Final = 0.5
 
 @final
 @dataclass(frozen=True, eq=False)
-class Homecoming:
+class Homecoming(StructOfArrays):
     """What the ends of n nodes look like.
 
     Attributes
@@ -82,9 +84,25 @@ class EndOutlook:
         self.ending = ending
         self._problem = problem
         self._table = WayHomeTable(problem, ending, predictor, threads)
+        self._last: tuple[Nodes, Homecoming] | None = None
+
+    def hopeful(self, nodes: Nodes) -> NDArray[np.intp]:
+        """Return the positions of nodes from which there may be a way to the end."""
+        return np.flatnonzero(self.homecoming(nodes).possible)
+
+    def taken(self, nodes: Nodes, rows: NDArray[np.intp]) -> Nodes:
+        """Return nodes at positions, about which `homecoming` need not look again."""
+        some = nodes.take(rows)
+        self._last = some, self.homecoming(nodes).take(rows)
+        return some
 
     def homecoming(self, nodes: Nodes) -> Homecoming:
         """Return how each of n nodes comes to the end."""
+        if self._last is None or self._last[0] is not nodes:
+            self._last = nodes, self._looked(nodes)
+        return self._last[1]
+
+    def _looked(self, nodes: Nodes) -> Homecoming:
         n = len(nodes)
         left = self.ending.days_left(nodes, nodes.t_ready_mjd2000[:, None])[:, 0]
         missing = self.ending.missing(nodes)
@@ -138,8 +156,8 @@ class EndOutlook:
         pick = (np.arange(n), *np.divmod(best, tof.shape[2]))
         return Homecoming(
             weight=np.ones(n),
-            possible=possible.reshape(n, -1).any(axis=1),
-            surely=surely.reshape(n, -1).any(axis=1),
+            possible=np.asarray(possible.reshape(n, -1).any(axis=1), dtype=np.bool_),
+            surely=np.asarray(surely.reshape(n, -1).any(axis=1), dtype=np.bool_),
             t_arr_mjd2000=nodes.t_ready_mjd2000 + delay[pick[:2]] + tof[pick],
             mass=final[pick],
         )

@@ -56,7 +56,7 @@ def test_new_bodies_come_between_the_ends(problem, searched, predictor, at_start
         assert new[0] == fixed_start(problem)
         assert new[-1] == ending_of(problem).row
         assert len(set(new[:-1])) == len(new) - 1
-        kept = (new[2:], rows[1:]) if at_start else (new[:-2], rows[:-1])
+        kept = (new[2:], rows[2:]) if at_start else (new[:-2], rows[:-1])
         np.testing.assert_array_equal(*kept)
 
 
