@@ -38,6 +38,8 @@ tof_days_min = 40.0
 tof_days_max = 240.0
 """
 
+pytestmark = pytest.mark.slow
+
 TINY = CampaignSettings(bodies=2, pairs=1, crews=2, width=10, improvements=2)
 
 
