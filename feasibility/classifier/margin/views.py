@@ -1,0 +1,141 @@
+"""`LegView`: what nets see of legs, and in which unit they estimate the acceleration at m*.
+
+Legs from rest to rest and legs with free ends have a view each, and nets of their own in the same
+model: what one kind learns changes nothing for the other.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.classifier.margin.ends import KINDS, kinds_of_ends
+from feasibility.classifier.margin.features import (
+    FEATURE_SET,
+    FEATURES,
+    QUICK_FEATURES,
+    domain_quantities,
+    log_acceleration,
+    margin_features,
+    quick_features,
+)
+from feasibility.classifier.margin.final_mass import (
+    BOUND_INPUTS,
+    FINAL_MASS_INPUTS,
+    MassInputs,
+    lambert_velocity,
+    rendezvous_mass_inputs,
+)
+from feasibility.classifier.margin.free_features import (
+    FREE_FEATURE_SET,
+    FREE_FEATURES,
+    FREE_LEAST,
+    FREE_QUICK_FEATURES,
+    free_features,
+    free_log_acceleration,
+    quick_free_features,
+)
+from feasibility.classifier.margin.free_final_mass import (
+    FREE_FINAL_MASS_INPUTS,
+    free_lambert_velocity,
+    free_mass_inputs,
+)
+from feasibility.classifier.margin.free_domain import free_domain_quantities
+from feasibility.legs import Legs
+
+_Array = NDArray[np.float64]
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class LegView:
+    """What the nets for one sort of legs see, with n the number of legs.
+
+    Attributes
+    ----------
+    prefix : str
+        Of the sections in a model's file.
+    feature_set : str
+        Name of the features.
+    names, quick_names : tuple of str
+        The features of the large and of the quick net.
+    features, quick_features : callable
+        Legs to features (n, k) and the hint (n,), NaN where there is none.
+    log_acceleration : callable
+        Legs and masses (n,) in kg to log(thrust / mass) (n,), in the unit of the hints.
+    least : float
+        Least logarithm of an acceleration: legs that need no thrust are taken to need this much.
+    domain_quantities : callable
+        Features (n, k), of all or of the quick ones, to what the domain is a range of (n, d).
+    kinds : tuple of str
+        Kinds of legs with calibrations of their own; none where all are one kind.
+    mass_inputs : callable
+        Inputs of the net for the final mass and what it corrects; see `MassInputs`.
+    mass_sizes : tuple of int
+        Numbers of inputs that such a net may have.
+    lambert_velocity : callable
+        Legs and features to (n,) m/s, the velocity change of the best Lambert arc.
+    """
+
+    prefix: str
+    feature_set: str
+    names: tuple[str, ...]
+    quick_names: tuple[str, ...]
+    features: Callable[[Legs], tuple[_Array, _Array]]
+    quick_features: Callable[[Legs], tuple[_Array, _Array]]
+    log_acceleration: Callable[[Legs, _Array], _Array]
+    least: float
+    domain_quantities: Callable[[_Array], _Array]
+    kinds: tuple[str, ...]
+    mass_inputs: MassInputs
+    mass_sizes: tuple[int, ...]
+    lambert_velocity: Callable[[Legs, _Array], _Array]
+
+    def section(self, name: str) -> str:
+        """Return the name of a section in a model's file."""
+        return f"{self.prefix}{name}"
+
+    def kinds_of(self, legs: Legs) -> NDArray[np.intp]:
+        """Return (n,) the number of each leg's kind, a row of `kinds`; all 0 where there is one."""
+        return kinds_of_ends(legs) if self.kinds else np.zeros(len(legs), dtype=np.intp)
+
+    def rows_of(self, legs: Legs) -> NDArray[np.intp]:
+        """Return the rows of the legs that are of this sort."""
+        return np.flatnonzero(legs.free_ends == bool(self.kinds))
+
+
+RENDEZVOUS: Final = LegView(
+    prefix="",
+    feature_set=FEATURE_SET,
+    names=FEATURES,
+    quick_names=QUICK_FEATURES,
+    features=margin_features,
+    quick_features=quick_features,
+    log_acceleration=log_acceleration,
+    least=-np.inf,
+    domain_quantities=domain_quantities,
+    kinds=(),
+    mass_inputs=rendezvous_mass_inputs,
+    mass_sizes=(len(BOUND_INPUTS), len(FINAL_MASS_INPUTS)),
+    lambert_velocity=lambert_velocity,
+)
+"""Legs from rest to rest, relative to the bodies."""
+
+FREE_ENDS: Final = LegView(
+    prefix="free_",
+    feature_set=FREE_FEATURE_SET,
+    names=FREE_FEATURES,
+    quick_names=FREE_QUICK_FEATURES,
+    features=free_features,
+    quick_features=quick_free_features,
+    log_acceleration=free_log_acceleration,
+    least=FREE_LEAST,
+    domain_quantities=free_domain_quantities,
+    kinds=KINDS,
+    mass_inputs=free_mass_inputs,
+    mass_sizes=(len(FREE_FINAL_MASS_INPUTS),),
+    lambert_velocity=free_lambert_velocity,
+)
+"""Legs whose velocity may differ from the body's at one end or both."""
