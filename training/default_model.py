@@ -59,13 +59,13 @@ FAMILIES = {
     "craft2900": (11_000, 0),
     "craft3900": (8_000, 3_000),
     "craft5000": (8_000, 0),
-    "nearby": (70_000, 10_000),
-    "launch": (70_000, 10_000),
-    "arrival": (60_000, 10_000),
-    "launch-flyby": (60_000, 10_000),
-    "flyby": (80_000, 10_000),
-    "flyby-nea": (40_000, 3_000),
-    "free": (60_000, 3_000),
+    "nearby": (40_000, 10_000),
+    "launch": (40_000, 10_000),
+    "arrival": (35_000, 10_000),
+    "launch-flyby": (35_000, 10_000),
+    "flyby": (45_000, 10_000),
+    "flyby-nea": (20_000, 3_000),
+    "free": (30_000, 3_000),
 }
 # Family: what differs from the protocol like which its legs are drawn.
 DIFFERING: dict[str, dict[str, Any]] = {
