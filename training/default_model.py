@@ -60,12 +60,12 @@ FAMILIES = {
     "craft3900": (8_000, 3_000),
     "craft5000": (8_000, 0),
     "nearby": (40_000, 10_000),
-    "launch": (40_000, 10_000),
-    "arrival": (35_000, 10_000),
-    "launch-flyby": (35_000, 10_000),
-    "flyby": (45_000, 10_000),
-    "flyby-nea": (20_000, 3_000),
-    "free": (30_000, 3_000),
+    "launch": (30_000, 10_000),
+    "arrival": (25_000, 10_000),
+    "launch-flyby": (25_000, 10_000),
+    "flyby": (35_000, 10_000),
+    "flyby-nea": (15_000, 3_000),
+    "free": (20_000, 3_000),
 }
 # Family: what differs from the protocol like which its legs are drawn.
 DIFFERING: dict[str, dict[str, Any]] = {
