@@ -6,11 +6,13 @@ interrupted, and --share makes a smaller model of the same kind:
 
     python training/default_model.py --out data/default [--share 0.1] [--workers 2]
 
-1. Legs with m* of all families: `FAMILIES`; the margin nets learn from them.
+1. Legs with m* of all families: `FAMILIES`; the margin nets learn from them. Legs with free ends
+   have nets of their own, which change nothing for the others (training/join_models.py takes
+   them from one model into another).
 2. With --hard-rounds N, N times: legs that the last model is most unsure of among several
    times as many (`HARD`), and a training with them too. Not part of the default model, as
    docs/guide/classifier.md says why.
-3. Legs with minimum propellant: `final_mass_legs.LEGS`; the net for the final mass learns from
+3. Legs with minimum propellant: `final_mass_legs.LEGS`; the nets for the final mass learn from
    them.
 
 With --margin-model FILE the first two steps are left out, and only the net for the final mass

@@ -127,7 +127,7 @@ class MarginEstimator:
         return LegPrediction(**columns)
 
     def _asked(self, legs: Legs) -> list[tuple[ViewNets, _Rows]]:
-        """Return which nets are asked about which rows; those of free ends only where there are."""
+        """Return which nets are asked about which rows; those for free ends only if needed."""
         free = legs.free_ends
         if self._free is None or not free.any():
             return [(self._rendezvous, np.arange(len(legs)))]

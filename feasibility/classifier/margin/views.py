@@ -28,6 +28,7 @@ from feasibility.classifier.margin.final_mass import (
     lambert_velocity,
     rendezvous_mass_inputs,
 )
+from feasibility.classifier.margin.free_domain import free_domain_quantities
 from feasibility.classifier.margin.free_features import (
     FREE_FEATURE_SET,
     FREE_FEATURES,
@@ -42,7 +43,6 @@ from feasibility.classifier.margin.free_final_mass import (
     free_lambert_velocity,
     free_mass_inputs,
 )
-from feasibility.classifier.margin.free_domain import free_domain_quantities
 from feasibility.legs import Legs
 
 _Array = NDArray[np.float64]
@@ -98,7 +98,7 @@ class LegView:
         return f"{self.prefix}{name}"
 
     def kinds_of(self, legs: Legs) -> NDArray[np.intp]:
-        """Return (n,) the number of each leg's kind, a row of `kinds`; all 0 where there is one."""
+        """Return (n,) the number of each leg's kind; all 0 where there is but one."""
         return kinds_of_ends(legs) if self.kinds else np.zeros(len(legs), dtype=np.intp)
 
     def rows_of(self, legs: Legs) -> NDArray[np.intp]:

@@ -12,7 +12,7 @@ from feasibility.dataset import Dataset
 from feasibility.errors import InputError
 from feasibility.learning.margin.examples import MarginExamples, legs_of
 from feasibility.learning.margin.fit import MarginEpoch, MarginRecipe, OnEpoch
-from feasibility.learning.margin.fit_view import SHARES, FittedView, fit_view
+from feasibility.learning.margin.fit_view import SHARES, fit_view
 from feasibility.runtime.provenance import provenance
 
 __all__ = [
@@ -72,7 +72,7 @@ def train_margin(
     rendezvous = legs_of(datasets, RENDEZVOUS)
     if not rendezvous:
         raise InputError(
-            "margin model: all legs have free ends (vinf_dep or vinf_arr); expected legs from rest "
+            "margin model: all legs have free ends (vinf_dep, vinf_arr); expected some from rest "
             "to rest too, or --model free-margin with a model to start from"
         )
     epochs: list[MarginEpoch] = []
