@@ -1,0 +1,481 @@
+"""The inputs of the nets for legs with free ends.
+
+`free_path_kernels` finds good excess velocities. With these the leg is one from rest to rest
+between moved ends, whose features and hint `feature_kernels` makes: as m* is the largest over all
+excess velocities, a small error of theirs hardly matters. Some more features say what the
+excess does, and how sure one can be of it.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.classifier.margin.feature_kernels import (
+    MAX_REVS,
+    N_FEATURES,
+    N_GEOMETRY,
+    N_NEED,
+    FeatureWork,
+    clip,
+    feature_workspace,
+    geometry,
+    leg_features,
+    log_ratio,
+    need,
+    to_frame,
+)
+from feasibility.classifier.margin.free_path_kernels import (
+    BALLISTIC,
+    BRANCHES,
+    N_STARTS,
+    ROUNDS,
+    SEGMENTS,
+    EndsWork,
+    bounded_impulse,
+    cheapest_branch,
+    cut_excess,
+    ends_workspace,
+    find_excess,
+    lay_ends,
+    lay_problem,
+    local_axes,
+    to_leg_frame,
+    weigh_alike,
+)
+from feasibility.classifier.margin.path_kernels import (
+    N_NODES,
+    SATURATED,
+    duals,
+    first_path,
+    impulse_effects,
+)
+from feasibility.orbits.lambert_kernels import lambert
+from feasibility.orbits.mima_kernels import mima_acceleration
+from feasibility.runtime.jit import inner_kernel, kernel
+from feasibility.sims_flanagan.fast.element_kernels import to_elements
+
+_Array = NDArray[np.float64]
+Scratch = tuple[_Array, _Array, _Array]
+
+N_END = 8
+N_ENDS = 2 * N_END
+N_DUALS = 6
+N_COMPARED = ROUNDS + 1 + 4 + 3 + 2
+N_FREE = N_FEATURES + N_ENDS + N_DUALS + N_COMPARED
+N_FREE_QUICK = N_GEOMETRY + N_NEED + N_ENDS + 2 + 2 * (MAX_REVS + 1)
+QUICK_SEGMENTS = 12
+
+LEAST_ACCELERATION = 1e-9
+"""m/s2: legs that need no more count as needing this. An engine of 0.1 N gives it to 100 000 t."""
+
+_TWO_PI = 2.0 * math.pi
+_LEAST_MOTION = 0.3
+# int() at the calls: numba would compile a kernel once for each literal number of steps.
+_QUICK_STEPS = 2
+
+
+@inner_kernel
+def end_features(
+    bound: float, excess: _Array, state: _Array, total: float, axes: _Array, out: _Array
+) -> None:
+    """Write N_END features of an end: bound, and excess velocity in the local frame.
+
+    All velocities in the same unit, which is that of the moved departure orbit; `state` is the
+    moved one.
+    """
+    open_end = bound == np.inf
+    out[0] = 1.0 if open_end else bound / (1.0 + bound)
+    out[1] = 1.0 if open_end else bound / (total + bound)
+    out[2] = 1.0 if open_end else 0.0
+    size = math.sqrt(excess[0] ** 2 + excess[1] ** 2 + excess[2] ** 2)
+    out[3] = 0.0 if open_end or bound == 0.0 else min(size / bound, 1.0)
+    out[4] = size / (total + size + 1e-12)
+    local_axes(state, state[3:], axes)
+    for k in range(3):
+        u = axes[k, 0] * excess[0] + axes[k, 1] * excess[1] + axes[k, 2] * excess[2]
+        out[5 + k] = clip(u, -3.0, 3.0)
+
+
+@inner_kernel
+def dual_features(
+    tof: float,
+    bounds: _Array,
+    excess: _Array,
+    axes: _Array,
+    feature_work: FeatureWork,
+    out: _Array,
+) -> None:
+    """Write N_DUALS features of what the dual of the hint says of both ends.
+
+    Its size beside that of the segments, how much of the work the excess does, and the cosine
+    of the angle to the excess: 1 at the optimum. The path in `feature_work` is spoilt.
+    """
+    (path, rows, p, _, g, _, _, _, anomaly), (s0, s1, x0, x1, _), _, _ = feature_work
+    average = 0.0
+    for i in range(N_NODES):
+        average += g[3 * N_NODES + i] / N_NODES
+    for j in range(6):
+        path[j * N_NODES] = x0[j]
+        path[j * N_NODES + 1] = x1[j]
+    anomaly[0] = tof
+    anomaly[1] = 0.0
+    for j in range(N_DUALS):
+        out[j] = 0.0
+    if not impulse_effects(path, 2, rows, anomaly):
+        return
+    duals(rows, p, 2, g)
+    for end in range(2):
+        state = s0 if end == 0 else s1
+        local_axes(state, state[3:], axes)
+        size = 0.0
+        along = 0.0
+        for j in range(3):
+            size += excess[end, j] ** 2
+            u = 0.0
+            for k in range(3):
+                u += axes[k, j] * g[k * N_NODES + end]
+            along += u * excess[end, j]
+        size = math.sqrt(size)
+        dual = g[3 * N_NODES + end]
+        sign = 1.0 if end == 0 else -1.0
+        o = 3 * end
+        out[o] = min(dual / average, 4.0)
+        bound = 0.0 if bounds[end] == np.inf else bounds[end]
+        out[o + 1] = dual * bound / (dual * bound + average)
+        out[o + 2] = sign * along / (size * dual) if size * dual > 0.0 else 0.0
+
+
+@inner_kernel
+def compared(
+    best: int, tof: float, base: float, ends_work: EndsWork, scale: float, out: _Array
+) -> None:
+    """Write N_COMPARED features that compare other estimates with the hint.
+
+    `base` is the logarithm of the hint's impulse, `scale` the velocity unit of `ends_work` in its.
+    """
+    over, rounds, starts = ends_work[7], ends_work[9], ends_work[10]
+    o = 0
+    for k in range(ROUNDS + 1):
+        out[o + k] = clip(math.log(max(rounds[k], 1e-12) * SEGMENTS * scale) - base, -1.5, 1.5)
+    o += ROUNDS + 1
+    # The best of each kind of start.
+    for kind in range(4):
+        first = (0, BRANCHES, BRANCHES + 3, N_STARTS - 1)[kind]
+        last = (BRANCHES, BRANCHES + 3, N_STARTS - 1, N_STARTS)[kind]
+        least = SATURATED
+        for q in range(first, last):
+            least = min(least, starts[q])
+        out[o + kind] = log_ratio(max(least, 1e-12) * SEGMENTS * scale, base)
+    o += 4
+    for revs in range(MAX_REVS + 1):
+        least = over[0] if revs == 0 else min(over[2 * revs - 1], over[2 * revs])
+        out[o + revs] = log_ratio(max(least, 1e-12) * scale, base)
+    o += MAX_REVS + 1
+    second = SATURATED
+    for q in range(N_STARTS):
+        if q != best:
+            second = min(second, starts[q])
+    out[o] = log_ratio(max(second, 1e-12) * SEGMENTS * scale, base)
+    out[o + 1] = 1.0 if best < BRANCHES else 0.0
+
+
+@inner_kernel
+def free_leg_features(
+    rv_dep: _Array,
+    rv_arr: _Array,
+    tof_s: float,
+    exhaust: float,
+    bounds: _Array,
+    mu: float,
+    ends_work: EndsWork,
+    feature_work: FeatureWork,
+    scratch: Scratch,
+    out: _Array,
+    found: _Array,
+) -> float:
+    """Write the features of one leg; return the logarithm of the best hint, in m/s2.
+
+    Parameters
+    ----------
+    rv_dep, rv_arr : (6,) float64, m and m/s
+    tof_s, exhaust : float, s and m/s
+    bounds : (2,) float64, m/s
+        Largest excess velocities at departure and arrival, inf allowed.
+    mu : float, m3/s2
+    ends_work, feature_work : tuples of arrays
+        `ends_workspace` and `feature_workspace`.
+    scratch : tuple of arrays
+        (5, 6) states, (3, 3) axes, (2, 3) excess velocities.
+    out : (N_FREE,) float64
+        Overwritten.
+    found : (6,) float64
+        Receives the excess velocities, m/s.
+
+    Returns
+    -------
+    float
+        NaN where no path was found (then `out` is NaN too). Never below the logarithm of
+        LEAST_ACCELERATION, which is that of a leg that needs no thrust.
+    """
+    states, axes, excess = scratch
+    s0, s1, moved_dep, moved_arr, scaled = states[0], states[1], states[2], states[3], states[4]
+    for j in range(N_FREE):
+        out[j] = np.nan
+    length = to_leg_frame(rv_dep, rv_arr, mu, axes, s0, s1)
+    if not length > 0.0:
+        return np.nan
+    speed = math.sqrt(mu / length)
+    tof, ve = tof_s * speed / length, exhaust / speed
+    best = find_excess(s0, s1, tof, ve, bounds[0] / speed, bounds[1] / speed, ends_work)
+    if best < 0:
+        return np.nan
+    best_ends = ends_work[11]
+    for j in range(3):
+        moved_dep[j], moved_arr[j] = rv_dep[j], rv_arr[j]
+        for end in range(2):
+            w = best_ends[end]
+            found[3 * end + j] = speed * (
+                axes[0, j] * w[0] + axes[1, j] * w[1] + axes[2, j] * w[2]
+            )
+        moved_dep[3 + j] = rv_dep[3 + j] + found[j]
+        moved_arr[3 + j] = rv_arr[3 + j] + found[3 + j]
+    hint = leg_features(moved_dep, moved_arr, tof_s, exhaust, mu, feature_work, out)
+    m0, m1, _, _, _ = feature_work[1]
+    a = to_frame(moved_dep, moved_arr, mu, m0, m1)
+    floor = math.log(LEAST_ACCELERATION)
+    if not a > 0.0 or math.isnan(hint):
+        if best != BALLISTIC:
+            return np.nan
+        # Such an orbit may have no features, but what is known does not depend on them.
+        for j in range(N_FREE):
+            out[j] = 0.0
+        return floor
+    unit = math.sqrt(mu / a)
+    tof = tof_s * unit / a
+    total = math.exp(hint) * tof
+    for end in range(2):
+        scaled[end] = bounds[end] / unit
+        # The excess velocities in the frame of the moved departure orbit.
+        body, moved = (rv_dep, m0) if end == 0 else (rv_arr, m1)
+        for j in range(3):
+            excess[end, j] = moved[3 + j]
+        local_frame_velocity(moved_dep, body, unit, axes, excess[end])
+    for end in range(2):
+        o = N_FEATURES + N_END * end
+        moved = m0 if end == 0 else m1
+        end_features(scaled[end], excess[end], moved, total, axes, out[o : o + N_END])
+    o = N_FEATURES + N_ENDS
+    dual_features(tof, scaled, excess, axes, feature_work, out[o : o + N_DUALS])
+    compared(best, tof, hint + math.log(tof), ends_work, speed / unit, out[o + N_DUALS :])
+    hint += math.log(mu / (a * a))
+    return floor if best == BALLISTIC else max(hint, floor)
+
+
+@inner_kernel
+def local_frame_velocity(
+    moved: _Array, body: _Array, unit: float, axes: _Array, velocity: _Array
+) -> None:
+    """Subtract a body's velocity, turned into the frame of the moved departure orbit."""
+    local_axes(moved, moved[3:], axes)
+    for j in range(3):
+        u, v, w = axes[j, 0], axes[j, 1], axes[j, 2]
+        velocity[j] -= (u * body[3] + v * body[4] + w * body[5]) / unit
+
+
+@inner_kernel
+def free_quick_features(
+    rv_dep: _Array,
+    rv_arr: _Array,
+    tof_s: float,
+    exhaust: float,
+    bounds: _Array,
+    mu: float,
+    ends_work: EndsWork,
+    feature_work: FeatureWork,
+    scratch: Scratch,
+    out: _Array,
+) -> float:
+    """Write the few features (N_FREE_QUICK,) that cost little; return the log of a rough hint.
+
+    The path between the ends with the excess velocities of the best Lambert arc, cut to the
+    bounds. Parameters and result as for `free_leg_features`.
+    """
+    path_work, ends, elements, _, _, v1, v2, over, _, _, _, _ = ends_work
+    path, rows, p, weights, g, _, _, d, _ = path_work
+    states, axes, _ = scratch
+    s0, s1, m0, m1, scaled = states[0], states[1], states[2], states[3], states[4]
+    state = feature_work[1][4]
+    for j in range(N_FREE_QUICK):
+        out[j] = np.nan
+    length = to_leg_frame(rv_dep, rv_arr, mu, axes, s0, s1)
+    if not length > 0.0:
+        return np.nan
+    speed = math.sqrt(mu / length)
+    tof = tof_s * speed / length
+    lambert(s0[:3], s1[:3], tof, MAX_REVS, 1.0, v1, v2)
+    branch = cheapest_branch(s0, s1, bounds[0] / speed, bounds[1] / speed, ends_work)
+    if branch < 0:
+        return np.nan
+    cut_excess(v1[branch], s0, bounds[0] / speed, ends[2])
+    cut_excess(v2[branch], s1, bounds[1] / speed, ends[3])
+    if not lay_ends(s0, s1, ends, elements):
+        return over_floor(over[branch], out)
+    # Everything again in the frame of the moved departure orbit.
+    a = to_frame(ends[0], ends[1], 1.0, m0, m1)
+    if not a > 0.0:
+        return over_floor(over[branch], out)
+    unit = math.sqrt(1.0 / a)
+    tof *= unit / a
+    ve = exhaust / speed / unit
+    local_axes(ends[0], ends[0, 3:], axes)
+    for end in range(2):
+        scaled[end] = bounds[end] / speed / unit
+        turn(axes, 1.0 / unit, ends[2 + end])
+    for j in range(6):
+        ends[0, j], ends[1, j] = m0[j], m1[j]
+    x0, x1 = elements[0], elements[1]
+    if not to_elements(m0, x0) or not to_elements(m1, x1):
+        return over_floor(over[branch], out)
+    mean = 0.5 * tof * (x0[0] + x1[0])
+    turns = np.rint((x1[5] - x0[5] - mean) / _TWO_PI)
+    near = x1[5] - x0[5] - mean - _TWO_PI * turns
+    geometry(m1, x0, x1, tof, ve, near, state, out)
+    x1[5] -= _TWO_PI * turns
+    first_path(x0, x1, tof, near, _LEAST_MOTION, int(QUICK_SEGMENTS), path)
+    dep, arr = scaled[0], scaled[1]
+    if not lay_problem(tof, dep, arr, int(QUICK_SEGMENTS), ends, elements, path_work):
+        return over_floor(over[branch], out)
+    guess = max(over[branch] / unit, 1e-9) / QUICK_SEGMENTS
+    weigh_alike(guess, dep, arr, int(QUICK_SEGMENTS), path_work)
+    z = bounded_impulse(ve, dep, arr, int(QUICK_SEGMENTS), int(_QUICK_STEPS), path_work)
+    if not 0.0 < z < SATURATED:
+        return over_floor(over[branch], out)
+    total = z * QUICK_SEGMENTS
+    need(total, tof, ve, d, p, out)
+    base = math.log(total)
+    o = N_GEOMETRY + N_NEED
+    for end in range(2):
+        end_features(scaled[end], ends[2 + end], ends[end], total, axes, out[o : o + N_END])
+        o += N_END
+    for end in range(2):
+        impulse = weights[QUICK_SEGMENTS + end] * g[3 * N_NODES + QUICK_SEGMENTS + end]
+        out[o + end] = min(impulse / (impulse + total), 1.0)
+    o += 2
+    for revs in range(MAX_REVS + 1):
+        b = revs if revs == 0 else 2 * revs - 1
+        if revs > 0 and over[b + 1] < over[b]:
+            b += 1
+        out[o] = log_ratio(max(over[b] / unit, 1e-12), base)
+        out[o + 1] = SATURATED
+        if over[b] < SATURATED:
+            out[o + 1] = left_acceleration(b, s0, s1, bounds, speed, ends_work) / unit
+        out[o + 1] = log_ratio(max(out[o + 1], 1e-12), base)
+        o += 2
+    floor = math.log(LEAST_ACCELERATION)
+    if over[branch] == 0.0:
+        return floor
+    return max(base + math.log(mu / length / length * unit / tof / a), floor)
+
+
+@inner_kernel
+def left_acceleration(
+    b: int, s0: _Array, s1: _Array, bounds: _Array, speed: float, ends_work: EndsWork
+) -> float:
+    """Return MIMA's acceleration times the flight time, of what the bounds leave of an arc."""
+    _, ends, _, _, _, v1, v2, _, _, _, _, _ = ends_work
+    cut_excess(v1[b], s0, bounds[0] / speed, ends[2])
+    cut_excess(v2[b], s1, bounds[1] / speed, ends[3])
+    for j in range(3):
+        ends[2, j] = v1[b, j] - s0[3 + j] - ends[2, j]
+        ends[3, j] = s1[3 + j] + ends[3, j] - v2[b, j]
+    a, _ = mima_acceleration(ends[2, :3], ends[3, :3], 1.0)
+    return float(a)
+
+
+@inner_kernel
+def over_floor(left: float, out: _Array) -> float:
+    """Return the hint where there are no features: known only where nothing is left to do."""
+    if left > 0.0:
+        for j in range(N_FREE_QUICK):
+            out[j] = np.nan
+        return np.nan
+    for j in range(N_FREE_QUICK):
+        out[j] = 0.0
+    return math.log(LEAST_ACCELERATION)
+
+
+@inner_kernel
+def turn(axes: _Array, scale: float, v: _Array) -> None:
+    """Turn a vector into axes, in another unit."""
+    x, y, z = v[0], v[1], v[2]
+    for j in range(3):
+        v[j] = scale * (axes[j, 0] * x + axes[j, 1] * y + axes[j, 2] * z)
+
+
+@inner_kernel
+def scratch_arrays() -> Scratch:
+    """Return states, axes and excess velocities."""
+    return np.empty((5, 6)), np.empty((3, 3)), np.empty((2, 3))
+
+
+@kernel
+def free_feature_batch(
+    rv_dep: _Array,
+    rv_arr: _Array,
+    tof_s: _Array,
+    exhaust: _Array,
+    bounds: _Array,
+    mu: float,
+    out: _Array,
+    hint: _Array,
+    excess: _Array,
+) -> None:
+    """Write features (n, N_FREE), log hints (n,) and excess velocities (n, 6) of n legs.
+
+    `bounds` is (n, 2); see `free_leg_features`.
+    """
+    ends_work, feature_work, scratch = ends_workspace(), feature_workspace(), scratch_arrays()
+    for i in range(len(tof_s)):
+        excess[i] = np.nan
+        hint[i] = free_leg_features(
+            rv_dep[i],
+            rv_arr[i],
+            tof_s[i],
+            exhaust[i],
+            bounds[i],
+            mu,
+            ends_work,
+            feature_work,
+            scratch,
+            out[i],
+            excess[i],
+        )
+
+
+@kernel
+def free_quick_batch(
+    rv_dep: _Array,
+    rv_arr: _Array,
+    tof_s: _Array,
+    exhaust: _Array,
+    bounds: _Array,
+    mu: float,
+    out: _Array,
+    hint: _Array,
+) -> None:
+    """Write features (n, N_FREE_QUICK) and log hints (n,) of n legs; see `free_quick_features`."""
+    ends_work, feature_work, scratch = ends_workspace(), feature_workspace(), scratch_arrays()
+    for i in range(len(tof_s)):
+        hint[i] = free_quick_features(
+            rv_dep[i],
+            rv_arr[i],
+            tof_s[i],
+            exhaust[i],
+            bounds[i],
+            mu,
+            ends_work,
+            feature_work,
+            scratch,
+            out[i],
+        )
