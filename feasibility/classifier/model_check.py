@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.classifier.artefact import Artefact
-from feasibility.classifier.margin.free_domain import FREE_DOMAIN_QUANTITIES
 from feasibility.classifier.margin.views import FREE_ENDS, RENDEZVOUS, LegView
 from feasibility.errors import InputError
 
@@ -135,7 +134,7 @@ def _check_kinds(artefact: Artefact) -> None:
     domain = artefact.section(view.section("domain"))
     _expect(domain["feature_set"].dtype.kind == "U", "array feature_set, expected a word")
     _expect(domain["feature_set"].ndim == 0, "array feature_set, expected one word")
-    _numbers(domain, "low", len(FREE_DOMAIN_QUANTITIES))
+    _numbers(domain, "low", len(view.domain_names))
     _numbers(domain, "kinds", len(view.kinds))
     scores = _numbers(
         artefact.section(view.section("calibration")), "positive_scores", len(view.kinds), None

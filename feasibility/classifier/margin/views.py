@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from feasibility.classifier.margin.ends import KINDS, kinds_of_ends
 from feasibility.classifier.margin.features import (
+    DOMAIN_QUANTITIES,
     FEATURE_SET,
     FEATURES,
     QUICK_FEATURES,
@@ -28,14 +29,15 @@ from feasibility.classifier.margin.final_mass import (
     lambert_velocity,
     rendezvous_mass_inputs,
 )
-from feasibility.classifier.margin.free_domain import free_domain_quantities
 from feasibility.classifier.margin.free_features import (
+    FREE_DOMAIN_QUANTITIES,
     FREE_FEATURE_SET,
     FREE_FEATURES,
-    FREE_LEAST,
     FREE_QUICK_FEATURES,
+    free_domain_quantities,
     free_features,
-    free_log_acceleration,
+    log_free_acceleration,
+    log_no_thrust,
     quick_free_features,
 )
 from feasibility.classifier.margin.free_final_mass import (
@@ -65,10 +67,12 @@ class LegView:
         Legs to features (n, k) and the hint (n,), NaN where there is none.
     log_acceleration : callable
         Legs and masses (n,) in kg to log(thrust / mass) (n,), in the unit of the hints.
-    least : float
-        Least logarithm of an acceleration: legs that need no thrust are taken to need this much.
+    least : callable
+        Returns the least logarithm of an acceleration, that of legs that need no thrust.
+    domain_names : tuple of str
+        What the domain is a range of, d quantities.
     domain_quantities : callable
-        Features (n, k), of all or of the quick ones, to what the domain is a range of (n, d).
+        Features (n, k), of all or of the quick ones, to these quantities (n, d).
     kinds : tuple of str
         Kinds of legs with calibrations of their own; none where all are one kind.
     mass_inputs : callable
@@ -86,7 +90,8 @@ class LegView:
     features: Callable[[Legs], tuple[_Array, _Array]]
     quick_features: Callable[[Legs], tuple[_Array, _Array]]
     log_acceleration: Callable[[Legs, _Array], _Array]
-    least: float
+    least: Callable[[], float]
+    domain_names: tuple[str, ...]
     domain_quantities: Callable[[_Array], _Array]
     kinds: tuple[str, ...]
     mass_inputs: MassInputs
@@ -106,6 +111,10 @@ class LegView:
         return np.flatnonzero(legs.free_ends == bool(self.kinds))
 
 
+def _any() -> float:
+    return -np.inf
+
+
 RENDEZVOUS: Final = LegView(
     prefix="",
     feature_set=FEATURE_SET,
@@ -114,7 +123,8 @@ RENDEZVOUS: Final = LegView(
     features=margin_features,
     quick_features=quick_features,
     log_acceleration=log_acceleration,
-    least=-np.inf,
+    least=_any,
+    domain_names=DOMAIN_QUANTITIES,
     domain_quantities=domain_quantities,
     kinds=(),
     mass_inputs=rendezvous_mass_inputs,
@@ -130,8 +140,9 @@ FREE_ENDS: Final = LegView(
     quick_names=FREE_QUICK_FEATURES,
     features=free_features,
     quick_features=quick_free_features,
-    log_acceleration=free_log_acceleration,
-    least=FREE_LEAST,
+    log_acceleration=log_free_acceleration,
+    least=log_no_thrust,
+    domain_names=FREE_DOMAIN_QUANTITIES,
     domain_quantities=free_domain_quantities,
     kinds=KINDS,
     mass_inputs=free_mass_inputs,

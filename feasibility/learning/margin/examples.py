@@ -71,7 +71,7 @@ class MarginExamples:
             X_quick, quick_hint = view.quick_features(legs)
             with np.errstate(divide="ignore"):
                 target = view.log_acceleration(legs, columns["m_star_kg"])
-            target = np.maximum(target, view.least)
+            target = np.maximum(target, view.least())
             known = np.isfinite(target) & np.isfinite(hint)
             relevant = np.abs(columns["log_margin"]) < _RELEVANT
             parts.append(
