@@ -147,9 +147,7 @@ def dual_features(
 
 
 @inner_kernel
-def compared(
-    best: int, tof: float, base: float, ends_work: EndsWork, scale: float, out: _Array
-) -> None:
+def compared(best: int, base: float, ends_work: EndsWork, scale: float, out: _Array) -> None:
     """Write N_COMPARED features that compare other estimates with the hint.
 
     `base` is the logarithm of the hint's impulse, `scale` the velocity unit of `ends_work` in its.
@@ -267,7 +265,7 @@ def free_leg_features(
         end_features(scaled[end], excess[end], moved, total, axes, out[o : o + N_END])
     o = N_FEATURES + N_ENDS
     dual_features(tof, scaled, excess, axes, feature_work, out[o : o + N_DUALS])
-    compared(best, tof, hint + math.log(tof), ends_work, speed / unit, out[o + N_DUALS :])
+    compared(best, hint + math.log(tof), ends_work, speed / unit, out[o + N_DUALS :])
     hint += math.log(mu / (a * a))
     return floor if best == BALLISTIC else max(hint, floor)
 
@@ -302,7 +300,7 @@ def free_quick_features(
     bounds. Parameters and result as for `free_leg_features`.
     """
     path_work, ends, elements, _, _, v1, v2, over, _, _, _, _ = ends_work
-    path, rows, p, weights, g, _, _, d, _ = path_work
+    path, _, p, weights, g, _, _, d, _ = path_work
     states, axes, _ = scratch
     s0, s1, m0, m1, scaled = states[0], states[1], states[2], states[3], states[4]
     state = feature_work[1][4]
