@@ -81,10 +81,11 @@ _LEAST_SHARE = 0.5
 _TYPICAL_IMPULSE = 0.1
 _SLOWEST = 0.3
 # int() at the calls: numba would compile a kernel once for each literal number of steps.
-_SCREEN_STEPS = 3
 _FIRST_STEPS = 3
 _NEXT_STEPS = 2
-_WORTH_PURSUING = 3.0
+_LAG_FIRST = 2.0
+_LAG_SECOND = 1.4
+_LAG_NEXT = 1.2
 _NEEDED_ROUNDS = 2
 
 
@@ -401,8 +402,7 @@ def cheapest_branch(s0: _Array, s1: _Array, dep: float, arr: float, work: EndsWo
 @inner_kernel
 def pursue(
     q: int,
-    rounds: int,
-    steps: int,
+    rival: float,
     s0: _Array,
     s1: _Array,
     tof: float,
@@ -411,9 +411,10 @@ def pursue(
     arr: float,
     work: EndsWork,
 ) -> float:
-    """Return z after some rounds from the q-th start, with the excess velocities in `ends`.
+    """Return z after ROUNDS rounds from the q-th start, with the excess velocities in `ends`.
 
-    SATURATED where it has no path. `z_rounds` holds the z of each round.
+    SATURATED where it has no path or leaves the ellipses; sooner where it lags behind `rival`,
+    the best z so far. `z_rounds` holds the z of each round.
     """
     path_work, ends, elements, flown, _, _, _, over, z_rounds, _, _, _ = work
     path, rows, p, weights, g, c, _, _, _ = path_work
@@ -424,13 +425,15 @@ def pursue(
     if q < BRANCHES:
         guess = max(over[q], 1e-9) / SEGMENTS
     weigh_alike(guess, dep, arr, int(SEGMENTS), path_work)
-    z = bounded_impulse(ve, dep, arr, int(SEGMENTS), steps, path_work)
+    z = bounded_impulse(ve, dep, arr, int(SEGMENTS), int(_FIRST_STEPS), path_work)
     if not 0.0 < z < SATURATED:
         return SATURATED
     z_rounds[0] = z
-    for k in range(1, rounds + 1):
+    for k in range(1, ROUNDS + 1):
         z_rounds[k] = z
-    for k in range(1, rounds + 1):
+    for k in range(1, ROUNDS + 1):
+        if z > (_LAG_FIRST if k == 1 else _LAG_SECOND if k == 2 else _LAG_NEXT) * rival:
+            return z
         read_excess(int(0), dep, s0, work)
         read_excess(int(1), arr, s1, work)
         for j in range(6):
@@ -460,7 +463,7 @@ def pursue(
         if not 0.0 < value < SATURATED:
             return z if k > _NEEDED_ROUNDS else SATURATED
         z = value
-        for j in range(k, rounds + 1):
+        for j in range(k, ROUNDS + 1):
             z_rounds[j] = z
     read_excess(int(0), dep, s0, work)
     read_excess(int(1), arr, s1, work)
@@ -500,8 +503,11 @@ def find_excess(
             best_rounds[k] = 0.0
         return BALLISTIC
     best = -1
-    for q in range(N_STARTS):
-        z_starts[q] = pursue(q, int(ROUNDS), int(_FIRST_STEPS), s0, s1, tof, ve, dep, arr, work)
+    for k in range(N_STARTS):
+        # The likely ones first.
+        q = N_STARTS - 1 if k == 0 else (BRANCHES + k - 1) % (N_STARTS - 1)
+        rival = z_starts[best] if best >= 0 else SATURATED
+        z_starts[q] = pursue(q, rival, s0, s1, tof, ve, dep, arr, work)
         if z_starts[q] < SATURATED and (best < 0 or z_starts[q] < z_starts[best]):
             best = q
             for j in range(3):
