@@ -41,6 +41,7 @@ from feasibility.classifier.margin.free_path_kernels import (
     lay_problem,
     local_axes,
     to_leg_frame,
+    turn_back,
     weigh_alike,
 )
 from feasibility.classifier.margin.path_kernels import (
@@ -229,13 +230,10 @@ def free_leg_features(
     if best < 0:
         return np.nan
     best_ends = ends_work[11]
+    for end in range(2):
+        turn_back(axes, speed, best_ends[end], found[3 * end : 3 * end + 3])
     for j in range(3):
         moved_dep[j], moved_arr[j] = rv_dep[j], rv_arr[j]
-        for end in range(2):
-            w = best_ends[end]
-            found[3 * end + j] = speed * (
-                axes[0, j] * w[0] + axes[1, j] * w[1] + axes[2, j] * w[2]
-            )
         moved_dep[3 + j] = rv_dep[3 + j] + found[j]
         moved_arr[3 + j] = rv_arr[3 + j] + found[3 + j]
     hint = leg_features(moved_dep, moved_arr, tof_s, exhaust, mu, feature_work, out)

@@ -133,6 +133,13 @@ def local_axes(r: _Array, v: _Array, axes: _Array) -> None:
 
 
 @inner_kernel
+def turn_back(axes: _Array, scale: float, v: _Array, out: _Array) -> None:
+    """Write a vector given in the frame of the leg as it is outside, in another unit."""
+    for j in range(3):
+        out[j] = scale * (axes[0, j] * v[0] + axes[1, j] * v[1] + axes[2, j] * v[2])
+
+
+@inner_kernel
 def cut_excess(v: _Array, own: _Array, bound: float, excess: _Array) -> float:
     """Write the excess of v over the velocity of a state, cut; return how much is left."""
     size = 0.0
