@@ -41,6 +41,7 @@ from feasibility.classifier.margin.free_path_kernels import (
     lay_problem,
     local_axes,
     to_leg_frame,
+    turn_back,
     weigh_alike,
 )
 from feasibility.classifier.margin.path_kernels import (
@@ -147,9 +148,7 @@ def dual_features(
 
 
 @inner_kernel
-def compared(
-    best: int, tof: float, base: float, ends_work: EndsWork, scale: float, out: _Array
-) -> None:
+def compared(best: int, base: float, ends_work: EndsWork, scale: float, out: _Array) -> None:
     """Write N_COMPARED features that compare other estimates with the hint.
 
     `base` is the logarithm of the hint's impulse, `scale` the velocity unit of `ends_work` in its.
@@ -231,13 +230,10 @@ def free_leg_features(
     if best < 0:
         return np.nan
     best_ends = ends_work[11]
+    for end in range(2):
+        turn_back(axes, speed, best_ends[end], found[3 * end : 3 * end + 3])
     for j in range(3):
         moved_dep[j], moved_arr[j] = rv_dep[j], rv_arr[j]
-        for end in range(2):
-            w = best_ends[end]
-            found[3 * end + j] = speed * (
-                axes[0, j] * w[0] + axes[1, j] * w[1] + axes[2, j] * w[2]
-            )
         moved_dep[3 + j] = rv_dep[3 + j] + found[j]
         moved_arr[3 + j] = rv_arr[3 + j] + found[3 + j]
     hint = leg_features(moved_dep, moved_arr, tof_s, exhaust, mu, feature_work, out)
@@ -267,7 +263,7 @@ def free_leg_features(
         end_features(scaled[end], excess[end], moved, total, axes, out[o : o + N_END])
     o = N_FEATURES + N_ENDS
     dual_features(tof, scaled, excess, axes, feature_work, out[o : o + N_DUALS])
-    compared(best, tof, hint + math.log(tof), ends_work, speed / unit, out[o + N_DUALS :])
+    compared(best, hint + math.log(tof), ends_work, speed / unit, out[o + N_DUALS :])
     hint += math.log(mu / (a * a))
     return floor if best == BALLISTIC else max(hint, floor)
 
@@ -302,7 +298,7 @@ def free_quick_features(
     bounds. Parameters and result as for `free_leg_features`.
     """
     path_work, ends, elements, _, _, v1, v2, over, _, _, _, _ = ends_work
-    path, rows, p, weights, g, _, _, d, _ = path_work
+    path, _, p, weights, g, _, _, d, _ = path_work
     states, axes, _ = scratch
     s0, s1, m0, m1, scaled = states[0], states[1], states[2], states[3], states[4]
     state = feature_work[1][4]

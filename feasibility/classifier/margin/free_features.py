@@ -78,15 +78,15 @@ def free_features(legs: Legs) -> tuple[_Array, _Array]:
         `log_no_thrust` for legs that need no thrust, whose maximum initial mass is inf. NaN where
         `X` is.
     """
-    return _with_excess(legs)[:2]
+    X, hint, _ = features_and_excess(legs)
+    return X, hint
 
 
-def excess_velocities(legs: Legs) -> _Array:
-    """Return (n, 6) m/s, the excess velocities at departure and arrival that the hint is for."""
-    return _with_excess(legs)[2]
+def features_and_excess(legs: Legs) -> tuple[_Array, _Array, _Array]:
+    """Return `free_features`, and (n, 6) m/s, the excess velocities that the hint is for.
 
-
-def _with_excess(legs: Legs) -> tuple[_Array, _Array, _Array]:
+    Those at departure come first. NaN where no path was found.
+    """
     from feasibility.classifier.margin import free_feature_kernels
 
     X = np.empty((len(legs), free_feature_kernels.N_FREE))

@@ -77,14 +77,16 @@ _TWO_PI = 2.0 * math.pi
 _STIFF = 1e6
 _DAMPING = 0.65
 _LEAST_MOTION = 0.3
-_LEAST_SHARE = 0.2
+_LEAST_SHARE = 0.5
 _TYPICAL_IMPULSE = 0.1
 _SLOWEST = 0.3
 # int() at the calls: numba would compile a kernel once for each literal number of steps.
-_SCREEN_STEPS = 3
 _FIRST_STEPS = 3
 _NEXT_STEPS = 2
-_WORTH_PURSUING = 3.0
+_LAG_FIRST = 2.0
+_LAG_SECOND = 1.4
+_LAG_NEXT = 1.2
+_NEEDED_ROUNDS = 2
 
 
 @inner_kernel
@@ -131,8 +133,15 @@ def local_axes(r: _Array, v: _Array, axes: _Array) -> None:
 
 
 @inner_kernel
+def turn_back(axes: _Array, scale: float, v: _Array, out: _Array) -> None:
+    """Write a vector given in the frame of the leg as it is outside, in another unit."""
+    for j in range(3):
+        out[j] = scale * (axes[0, j] * v[0] + axes[1, j] * v[1] + axes[2, j] * v[2])
+
+
+@inner_kernel
 def cut_excess(v: _Array, own: _Array, bound: float, excess: _Array) -> float:
-    """Write the excess of v over the velocity of a state, cut; return by how much it is too big."""
+    """Write the excess of v over the velocity of a state, cut; return how much is left."""
     size = 0.0
     for j in range(3):
         excess[j] = v[j] - own[3 + j]
@@ -200,8 +209,7 @@ def bounded_impulse(
         if not own > 0.0:
             return 0.0
         # While the excess is far from its optimum the bound may be worth nothing.
-        least = _LEAST_SHARE if step < steps - 1 else 1e-3
-        z = balanced_impulse(max(value, least * own), g, ve, segments, c)
+        z = balanced_impulse(max(value, _LEAST_SHARE * own), g, ve, segments, c)
         if step < steps - 1:
             weigh(g, c, z, dep, arr, segments, weights)
     return z
@@ -232,6 +240,14 @@ def read_excess(end: int, bound: float, own: _Array, work: EndsWork) -> None:
 
 
 @inner_kernel
+def move_part(own: _Array, state: _Array, excess: _Array) -> None:
+    """Move an excess velocity back to a part of the way from that of the state."""
+    for j in range(3):
+        before = state[3 + j] - own[3 + j]
+        excess[j] = before + _DAMPING * (excess[j] - before)
+
+
+@inner_kernel
 def lay_rows(tof: float, segments: int, path_work: PathWork) -> bool:
     """Write the rows of the segments and both ends; return False off the ellipses."""
     path, rows, _, _, _, _, _, _, anomaly = path_work
@@ -244,7 +260,7 @@ def lay_rows(tof: float, segments: int, path_work: PathWork) -> bool:
 
 @inner_kernel
 def lay_ends(s0: _Array, s1: _Array, ends: _Array, elements: _Array) -> bool:
-    """Write the states with excess velocities and their elements; return False off the ellipses."""
+    """Write the states with excess and their elements; return False off the ellipses."""
     for j in range(3):
         ends[0, j] = s0[j]
         ends[1, j] = s1[j]
@@ -393,8 +409,7 @@ def cheapest_branch(s0: _Array, s1: _Array, dep: float, arr: float, work: EndsWo
 @inner_kernel
 def pursue(
     q: int,
-    rounds: int,
-    steps: int,
+    rival: float,
     s0: _Array,
     s1: _Array,
     tof: float,
@@ -403,30 +418,42 @@ def pursue(
     arr: float,
     work: EndsWork,
 ) -> float:
-    """Return z after some rounds from the q-th start, with the excess velocities in `ends`.
+    """Return z after ROUNDS rounds from the q-th start, with the excess velocities in `ends`.
 
-    SATURATED where it has no path. `z_rounds` holds the z of each round.
+    SATURATED where it has no path or leaves the ellipses; sooner where it lags behind `rival`,
+    the best z so far. `z_rounds` holds the z of each round.
     """
     path_work, ends, elements, flown, _, _, _, over, z_rounds, _, _, _ = work
     path, rows, p, weights, g, c, _, _, _ = path_work
+    before = ends[5:]
     if not lay_start(q, s0, s1, tof, dep, arr, work):
         return SATURATED
     guess = _TYPICAL_IMPULSE / SEGMENTS
     if q < BRANCHES:
         guess = max(over[q], 1e-9) / SEGMENTS
     weigh_alike(guess, dep, arr, int(SEGMENTS), path_work)
-    z = bounded_impulse(ve, dep, arr, int(SEGMENTS), steps, path_work)
+    z = bounded_impulse(ve, dep, arr, int(SEGMENTS), int(_FIRST_STEPS), path_work)
     if not 0.0 < z < SATURATED:
         return SATURATED
     z_rounds[0] = z
-    for k in range(1, rounds + 1):
+    for k in range(1, ROUNDS + 1):
         z_rounds[k] = z
-    for k in range(1, rounds + 1):
+    for k in range(1, ROUNDS + 1):
+        if z > (_LAG_FIRST if k == 1 else _LAG_SECOND if k == 2 else _LAG_NEXT) * rival:
+            return z
         read_excess(int(0), dep, s0, work)
         read_excess(int(1), arr, s1, work)
+        for j in range(6):
+            before[0, j], before[1, j] = ends[0, j], ends[1, j]
+        bound_path = lay_ends(s0, s1, ends, elements)
+        if bound_path:
+            flown_path(elements[0], rows, weights, g, tof, int(SEGMENTS), flown)
+        move_part(s0, before[0], ends[2])
+        move_part(s1, before[1], ends[3])
         if not lay_ends(s0, s1, ends, elements):
-            return z
-        flown_path(elements[0], rows, weights, g, tof, int(SEGMENTS), flown)
+            return z if k > _NEEDED_ROUNDS else SATURATED
+        if not bound_path:
+            flown_path(elements[0], rows, weights, g, tof, int(SEGMENTS), flown)
         last = SEGMENTS - 1
         longitude = flown[5 * N_NODES + last] + 0.5 * tof / SEGMENTS * flown[last]
         elements[1, 5] += _TWO_PI * np.rint((longitude - elements[1, 5]) / _TWO_PI)
@@ -436,14 +463,14 @@ def pursue(
                     flown[j * N_NODES + i] - path[j * N_NODES + i]
                 )
         if not lay_problem(tof, dep, arr, int(SEGMENTS), ends, elements, path_work):
-            return z
+            return z if k > _NEEDED_ROUNDS else SATURATED
         duals(rows, p, _NODES, g)
         weigh(g, c, z, dep, arr, int(SEGMENTS), weights)
         value = bounded_impulse(ve, dep, arr, int(SEGMENTS), int(_NEXT_STEPS), path_work)
         if not 0.0 < value < SATURATED:
-            return z
+            return z if k > _NEEDED_ROUNDS else SATURATED
         z = value
-        for j in range(k, rounds + 1):
+        for j in range(k, ROUNDS + 1):
             z_rounds[j] = z
     read_excess(int(0), dep, s0, work)
     read_excess(int(1), arr, s1, work)
@@ -483,8 +510,11 @@ def find_excess(
             best_rounds[k] = 0.0
         return BALLISTIC
     best = -1
-    for q in range(N_STARTS):
-        z_starts[q] = pursue(q, int(ROUNDS), int(_FIRST_STEPS), s0, s1, tof, ve, dep, arr, work)
+    for k in range(N_STARTS):
+        # The likely ones first.
+        q = N_STARTS - 1 if k == 0 else (BRANCHES + k - 1) % (N_STARTS - 1)
+        rival = z_starts[best] if best >= 0 else SATURATED
+        z_starts[q] = pursue(q, rival, s0, s1, tof, ve, dep, arr, work)
         if z_starts[q] < SATURATED and (best < 0 or z_starts[q] < z_starts[best]):
             best = q
             for j in range(3):
@@ -498,13 +528,13 @@ def find_excess(
 def ends_workspace() -> EndsWork:
     """Return scratch arrays of a leg with free ends.
 
-    The path's; states with excess velocities, excess velocities and one more; elements of the
-    ends; flown path; axes; Lambert velocities at departure and arrival; what they exceed the
-    bounds by; z of the rounds, and of the best start; z of the starts; excess velocities of the best.
+    The path's; states with excess, excess velocities and one more; elements of the ends; flown
+    path; axes; Lambert velocities at departure and arrival; what they exceed the bounds by; z of
+    the rounds, and of the best start; z of the starts; excess velocities of the best.
     """
     return (
         workspace(),
-        np.zeros((5, 6)),
+        np.zeros((7, 6)),
         np.empty((2, 6)),
         np.empty(6 * N_NODES),
         np.empty((3, 3)),
