@@ -19,9 +19,9 @@ from feasibility.legs import Legs
 
 _Array = NDArray[np.float64]
 
-MassInputs = Callable[[Legs, _Array, _Array, int], tuple[_Array, _Array]]
-"""Legs, features, log(m*/m0) (n,) and the number of a net's inputs to those inputs (n, k), and
-(n,) m/s, the velocity change that it corrects."""
+MassInputs = Callable[[Legs, _Array, _Array, _Array, int], tuple[_Array, _Array]]
+"""Legs, features, what else their computation gave (n, e), log(m*/m0) (n,) and the number of a
+net's inputs to those inputs (n, k), and (n,) m/s, the velocity change that it corrects."""
 
 BOUND_INPUTS: Final = (
     *FEATURES,
@@ -112,7 +112,11 @@ def inputs_and_base(legs: Legs, X: _Array, log_margin: _Array) -> tuple[_Array, 
 
 
 def rendezvous_mass_inputs(
-    legs: Legs, X: _Array, log_margin: _Array, size: int
+    legs: Legs,
+    X: _Array,
+    more: _Array,  # noqa: ARG001 (there is no more)
+    log_margin: _Array,
+    size: int,
 ) -> tuple[_Array, _Array]:
     """Return the net's inputs (n, size), and (n,) m/s, the velocity change that it corrects.
 
@@ -120,6 +124,8 @@ def rendezvous_mass_inputs(
     ----------
     legs, X, log_margin
         As for `final_mass_inputs`.
+    more : (n, 0) float64
+        Nothing.
     size : int
         Inputs of the net: those of `BOUND_INPUTS` where it is from before the hint.
     """
@@ -192,6 +198,7 @@ def final_mass(
     error_fit: _Array = AS_IT_SAYS,
     mass_inputs: MassInputs = rendezvous_mass_inputs,
     lambert: Callable[[Legs, _Array], _Array] = lambert_velocity,
+    more: _Array | None = None,
 ) -> tuple[_Array, _Array]:
     """Return the mass at arrival with least propellant and the error to expect.
 
@@ -210,6 +217,8 @@ def final_mass(
         What the net sees and corrects.
     lambert : callable
         Legs and features to the bound by Lambert's arcs, (n,) m/s.
+    more : (n, e) float64, optional
+        What `mass_inputs` wants besides.
 
     Returns
     -------
@@ -218,17 +227,18 @@ def final_mass(
     """
     most = np.maximum(legs.m0 - legs.thrust * legs.tof_s / legs.exhaust_velocity, 0.0)
     mass, error = most, np.full(len(legs), np.nan)
+    more = np.empty((len(legs), 0)) if more is None else more
     rows = np.flatnonzero(log_margin >= _NEARLY_FLYABLE)
     if not len(rows):
         return mass, error
     if len(rows) < len(legs):
         legs, X, log_margin, most = legs.take(rows), X[rows], log_margin[rows], most[rows]
-        margin_error = margin_error[rows]
+        margin_error, more = margin_error[rows], more[rows]
     if net is None:
         full = full_thrust_velocity(legs, np.maximum(log_margin, 0.0))
         change, doubt = np.minimum(full, lambert(legs, X)), np.full(len(rows), np.nan)
     else:
-        inputs, base = mass_inputs(legs, X, log_margin, net.inputs)
+        inputs, base = mass_inputs(legs, X, more, log_margin, net.inputs)
         correction, doubt = net(inputs)
         change = base * np.exp(correction)
         doubt = np.exp(log_expected_error(doubt, margin_error, error_fit))

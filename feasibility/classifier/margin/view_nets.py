@@ -117,16 +117,17 @@ class ViewNets:
 
     def predict(self, legs: Legs) -> LegPrediction:
         """Return all answers for n legs from one computation of their features."""
-        X, hint = self._view.features(legs)
+        X, hint, more = self._view.features_and_more(legs)
         log_margin, doubt, inside = self._estimate(legs, X, hint)
         rows = np.flatnonzero(np.isfinite(log_margin))
         mass, error = np.full(len(legs), np.nan), np.full(len(legs), np.nan)
         known = (legs, X, log_margin, doubt)
         if len(rows) < len(legs):
             known = (legs.take(rows), X[rows], log_margin[rows], doubt[rows])
+            more = more[rows]
         mass[rows], error[rows] = final_mass(
             *known, self._final_mass, self._error_fit, self._view.mass_inputs,
-            self._view.lambert_velocity,
+            self._view.lambert_velocity, more,
         )  # fmt: skip
         return LegPrediction(
             margin=np.exp(log_margin),

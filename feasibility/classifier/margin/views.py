@@ -34,6 +34,7 @@ from feasibility.classifier.margin.free_features import (
     FREE_FEATURE_SET,
     FREE_FEATURES,
     FREE_QUICK_FEATURES,
+    features_and_excess,
     free_domain_quantities,
     free_features,
     log_free_acceleration,
@@ -42,10 +43,10 @@ from feasibility.classifier.margin.free_features import (
 )
 from feasibility.classifier.margin.free_final_mass import (
     FREE_FINAL_MASS_INPUTS,
-    free_lambert_velocity,
-    free_mass_inputs,
+    free_inputs_and_base,
 )
 from feasibility.legs import Legs
+from feasibility.orbits.lambert import lambert_delta_v
 
 _Array = NDArray[np.float64]
 
@@ -65,6 +66,8 @@ class LegView:
         The features of the large and of the quick net.
     features, quick_features : callable
         Legs to features (n, k) and the hint (n,), NaN where there is none.
+    features_and_more : callable
+        Legs to the same, and what `mass_inputs` wants besides, (n, e).
     log_acceleration : callable
         Legs and masses (n,) in kg to log(thrust / mass) (n,), in the unit of the hints.
     least : callable
@@ -89,6 +92,7 @@ class LegView:
     quick_names: tuple[str, ...]
     features: Callable[[Legs], tuple[_Array, _Array]]
     quick_features: Callable[[Legs], tuple[_Array, _Array]]
+    features_and_more: Callable[[Legs], tuple[_Array, _Array, _Array]]
     log_acceleration: Callable[[Legs, _Array], _Array]
     least: Callable[[], float]
     domain_names: tuple[str, ...]
@@ -115,6 +119,34 @@ def _any() -> float:
     return -np.inf
 
 
+def _features_alone(legs: Legs) -> tuple[_Array, _Array, _Array]:
+    return *margin_features(legs), np.empty((len(legs), 0))
+
+
+def _free_mass_inputs(
+    legs: Legs,
+    X: _Array,
+    more: _Array,
+    log_margin: _Array,
+    size: int,  # noqa: ARG001 (there is one version so far)
+) -> tuple[_Array, _Array]:
+    return free_inputs_and_base(legs, X, more, log_margin)
+
+
+def _free_lambert_velocity(legs: Legs, X: _Array) -> _Array:
+    """Return (n,) m/s, Lambert's least sum of impulses beyond the excesses, up to 2 revolutions.
+
+    Where there is no arc, those between the ends of the hint count.
+    """
+    left = lambert_delta_v(
+        *(legs.rv_dep, legs.rv_arr, legs.tof_s),
+        vinf_dep=legs.vinf_dep,
+        vinf_arr=legs.vinf_arr,
+    )
+    between = lambert_velocity(legs, X[:, : len(FEATURES)])
+    return np.where(np.isfinite(left), left, between)
+
+
 RENDEZVOUS: Final = LegView(
     prefix="",
     feature_set=FEATURE_SET,
@@ -122,6 +154,7 @@ RENDEZVOUS: Final = LegView(
     quick_names=QUICK_FEATURES,
     features=margin_features,
     quick_features=quick_features,
+    features_and_more=_features_alone,
     log_acceleration=log_acceleration,
     least=_any,
     domain_names=DOMAIN_QUANTITIES,
@@ -140,13 +173,14 @@ FREE_ENDS: Final = LegView(
     quick_names=FREE_QUICK_FEATURES,
     features=free_features,
     quick_features=quick_free_features,
+    features_and_more=features_and_excess,
     log_acceleration=log_free_acceleration,
     least=log_no_thrust,
     domain_names=FREE_DOMAIN_QUANTITIES,
     domain_quantities=free_domain_quantities,
     kinds=KINDS,
-    mass_inputs=free_mass_inputs,
+    mass_inputs=_free_mass_inputs,
     mass_sizes=(len(FREE_FINAL_MASS_INPUTS),),
-    lambert_velocity=free_lambert_velocity,
+    lambert_velocity=_free_lambert_velocity,
 )
 """Legs whose velocity may differ from the body's at one end or both."""

@@ -185,12 +185,14 @@ class _Flown:
             m_final = dataset.columns["m_final_kg"]
             flown = np.flatnonzero(m_final < (1.0 - _LEAST_BURNT) * dataset.columns["m0_kg"])
             legs = dataset.legs.take(flown)
-            X, _ = view.features(legs)
+            X, _, more = view.features_and_more(legs)
             log_margin, margin_error, _ = estimator.estimate(legs)
             rows = np.flatnonzero(np.isfinite(log_margin))
             legs, flown, X, log_margin = legs.take(rows), flown[rows], X[rows], log_margin[rows]
             used = np.log(legs.m0 / m_final[flown]) * legs.exhaust_velocity
-            inputs, base = view.mass_inputs(legs, X, log_margin, view.mass_sizes[-1])
+            inputs, base = view.mass_inputs(
+                legs, X, more[rows], log_margin, view.mass_sizes[-1]
+            )
             share = base / legs.exhaust_velocity
             parts.append((inputs, np.log(used / base), share, margin_error[rows], pairs[flown]))
         return cls(*(np.concatenate(column) for column in zip(*parts, strict=True)))
