@@ -33,13 +33,15 @@ from feasibility.classifier.margin.free_path_kernels import (
     SEGMENTS,
     EndsWork,
     bounded_impulse,
-    cheapest_branch,
     cut_excess,
     ends_workspace,
     find_excess,
     lay_ends,
+    lay_first,
     lay_problem,
     local_axes,
+    own_excess,
+    read_excess,
     to_leg_frame,
     turn_back,
     weigh_alike,
@@ -48,7 +50,6 @@ from feasibility.classifier.margin.path_kernels import (
     N_NODES,
     SATURATED,
     duals,
-    first_path,
     impulse_effects,
 )
 from feasibility.orbits.lambert_kernels import lambert
@@ -62,16 +63,15 @@ Scratch = tuple[_Array, _Array, _Array]
 N_END = 8
 N_ENDS = 2 * N_END
 N_DUALS = 6
-N_COMPARED = ROUNDS + 1 + 4 + 3 + 2
+N_COMPARED = ROUNDS + 1 + 3 + MAX_REVS + 1 + 3
 N_FREE = N_FEATURES + N_ENDS + N_DUALS + N_COMPARED
-N_FREE_QUICK = N_GEOMETRY + N_NEED + N_ENDS + 2 + 2 * (MAX_REVS + 1)
+N_FREE_QUICK = N_GEOMETRY + N_NEED + N_ENDS + 5
 QUICK_SEGMENTS = 12
 
 LEAST_ACCELERATION = 1e-9
 """m/s2: legs that need no more count as needing this. An engine of 0.1 N gives it to 100 000 t."""
 
-_TWO_PI = 2.0 * math.pi
-_LEAST_MOTION = 0.3
+_LARGE = 0.7
 # int() at the calls: numba would compile a kernel once for each literal number of steps.
 _QUICK_STEPS = 2
 
@@ -159,14 +159,14 @@ def compared(best: int, base: float, ends_work: EndsWork, scale: float, out: _Ar
         out[o + k] = clip(math.log(max(rounds[k], 1e-12) * SEGMENTS * scale) - base, -1.5, 1.5)
     o += ROUNDS + 1
     # The best of each kind of start.
-    for kind in range(4):
-        first = (0, BRANCHES, BRANCHES + 3, N_STARTS - 1)[kind]
-        last = (BRANCHES, BRANCHES + 3, N_STARTS - 1, N_STARTS)[kind]
+    for kind in range(3):
+        first = (0, BRANCHES, N_STARTS - 1)[kind]
+        last = (BRANCHES, N_STARTS - 1, N_STARTS)[kind]
         least = SATURATED
         for q in range(first, last):
             least = min(least, starts[q])
         out[o + kind] = log_ratio(max(least, 1e-12) * SEGMENTS * scale, base)
-    o += 4
+    o += 3
     for revs in range(MAX_REVS + 1):
         least = over[0] if revs == 0 else min(over[2 * revs - 1], over[2 * revs])
         out[o + revs] = log_ratio(max(least, 1e-12) * scale, base)
@@ -177,6 +177,7 @@ def compared(best: int, base: float, ends_work: EndsWork, scale: float, out: _Ar
             second = min(second, starts[q])
     out[o] = log_ratio(max(second, 1e-12) * SEGMENTS * scale, base)
     out[o + 1] = 1.0 if best < BRANCHES else 0.0
+    out[o + 2] = 1.0
 
 
 @inner_kernel
@@ -241,12 +242,13 @@ def free_leg_features(
     a = to_frame(moved_dep, moved_arr, mu, m0, m1)
     floor = math.log(LEAST_ACCELERATION)
     if not a > 0.0 or math.isnan(hint):
-        if best != BALLISTIC:
-            return np.nan
-        # Such an orbit may have no features, but what is known does not depend on them.
+        # There are no features of such orbits (the last one says so), but there is a hint.
         for j in range(N_FREE):
             out[j] = 0.0
-        return floor
+        if best == BALLISTIC:
+            return floor
+        total = ends_work[9][ROUNDS] * SEGMENTS
+        return max(math.log(total / tof * mu / length / length), floor)
     unit = math.sqrt(mu / a)
     tof = tof_s * unit / a
     total = math.exp(hint) * tof
@@ -280,6 +282,38 @@ def local_frame_velocity(
 
 
 @inner_kernel
+def quick_excess(
+    s0: _Array, s1: _Array, tof: float, ve: float, dep: float, arr: float, ends_work: EndsWork
+) -> float:
+    """Write rough excess velocities into `ends` of `ends_work`; return a rough sum of impulses.
+
+    0 where the direct Lambert arc needs none, SATURATED where there is no path.
+    """
+    path_work, ends, elements, _, _, v1, v2, over, _, _, _, _ = ends_work
+    lambert(s0[:3], s1[:3], tof, int(0), 1.0, v1, v2)
+    over[0] = SATURATED
+    if not math.isnan(v1[0, 0]):
+        over[0] = cut_excess(v1[0], s0, dep, ends[2]) + cut_excess(v2[0], s1, arr, ends[3])
+        if over[0] == 0.0:
+            return 0.0
+    if over[0] > _LARGE or not lay_ends(s0, s1, ends, elements):
+        own_excess(s0, s1, dep, arr, ends)
+        if not lay_ends(s0, s1, ends, elements):
+            return SATURATED
+    lay_first(tof, int(0), int(QUICK_SEGMENTS), elements, path_work)
+    if not lay_problem(tof, dep, arr, int(QUICK_SEGMENTS), ends, elements, path_work):
+        return SATURATED
+    guess = min(over[0], _LARGE) / QUICK_SEGMENTS
+    weigh_alike(guess, dep, arr, int(QUICK_SEGMENTS), path_work)
+    z = bounded_impulse(ve, dep, arr, int(QUICK_SEGMENTS), int(_QUICK_STEPS), path_work)
+    if not 0.0 < z < SATURATED:
+        return SATURATED
+    read_excess(int(0), dep, s0, int(QUICK_SEGMENTS), ends_work)
+    read_excess(int(1), arr, s1, int(QUICK_SEGMENTS), ends_work)
+    return z * QUICK_SEGMENTS
+
+
+@inner_kernel
 def free_quick_features(
     rv_dep: _Array,
     rv_arr: _Array,
@@ -294,84 +328,70 @@ def free_quick_features(
 ) -> float:
     """Write the few features (N_FREE_QUICK,) that cost little; return the log of a rough hint.
 
-    The path between the ends with the excess velocities of the best Lambert arc, cut to the
-    bounds. Parameters and result as for `free_leg_features`.
+    Rough excess velocities, and the first path between the ends that they lead to. Parameters
+    and result as for `free_leg_features`.
     """
-    path_work, ends, elements, _, _, v1, v2, over, _, _, _, _ = ends_work
-    path, _, p, weights, g, _, _, d, _ = path_work
+    path_work, ends, elements, _, _, _, _, over, _, _, _, _ = ends_work
+    _, _, p, weights, g, _, _, d, _ = path_work
     states, axes, _ = scratch
     s0, s1, m0, m1, scaled = states[0], states[1], states[2], states[3], states[4]
-    state = feature_work[1][4]
     for j in range(N_FREE_QUICK):
         out[j] = np.nan
     length = to_leg_frame(rv_dep, rv_arr, mu, axes, s0, s1)
     if not length > 0.0:
         return np.nan
     speed = math.sqrt(mu / length)
-    tof = tof_s * speed / length
-    lambert(s0[:3], s1[:3], tof, MAX_REVS, 1.0, v1, v2)
-    branch = cheapest_branch(s0, s1, bounds[0] / speed, bounds[1] / speed, ends_work)
-    if branch < 0:
-        return np.nan
-    cut_excess(v1[branch], s0, bounds[0] / speed, ends[2])
-    cut_excess(v2[branch], s1, bounds[1] / speed, ends[3])
-    if not lay_ends(s0, s1, ends, elements):
-        return over_floor(over[branch], out)
+    tof, ve = tof_s * speed / length, exhaust / speed
+    dep, arr = bounds[0] / speed, bounds[1] / speed
+    total = quick_excess(s0, s1, tof, ve, dep, arr, ends_work)
     # Everything again in the frame of the moved departure orbit.
+    if not total < SATURATED or not lay_ends(s0, s1, ends, elements):
+        return over_floor(total, out)
     a = to_frame(ends[0], ends[1], 1.0, m0, m1)
     if not a > 0.0:
-        return over_floor(over[branch], out)
+        return over_floor(total, out)
     unit = math.sqrt(1.0 / a)
     tof *= unit / a
-    ve = exhaust / speed / unit
+    ve /= unit
     local_axes(ends[0], ends[0, 3:], axes)
     for end in range(2):
         scaled[end] = bounds[end] / speed / unit
         turn(axes, 1.0 / unit, ends[2 + end])
     for j in range(6):
         ends[0, j], ends[1, j] = m0[j], m1[j]
-    x0, x1 = elements[0], elements[1]
-    if not to_elements(m0, x0) or not to_elements(m1, x1):
-        return over_floor(over[branch], out)
-    mean = 0.5 * tof * (x0[0] + x1[0])
-    turns = np.rint((x1[5] - x0[5] - mean) / _TWO_PI)
-    near = x1[5] - x0[5] - mean - _TWO_PI * turns
-    geometry(m1, x0, x1, tof, ve, near, state, out)
-    x1[5] -= _TWO_PI * turns
-    first_path(x0, x1, tof, near, _LEAST_MOTION, int(QUICK_SEGMENTS), path)
+    if not to_elements(m0, elements[0]) or not to_elements(m1, elements[1]):
+        return over_floor(total, out)
+    near = lay_first(tof, int(0), int(QUICK_SEGMENTS), elements, path_work)
     dep, arr = scaled[0], scaled[1]
     if not lay_problem(tof, dep, arr, int(QUICK_SEGMENTS), ends, elements, path_work):
-        return over_floor(over[branch], out)
-    guess = max(over[branch] / unit, 1e-9) / QUICK_SEGMENTS
+        return over_floor(total, out)
+    guess = max(total / unit, 1e-9) / QUICK_SEGMENTS
     weigh_alike(guess, dep, arr, int(QUICK_SEGMENTS), path_work)
     z = bounded_impulse(ve, dep, arr, int(QUICK_SEGMENTS), int(_QUICK_STEPS), path_work)
     if not 0.0 < z < SATURATED:
-        return over_floor(over[branch], out)
-    total = z * QUICK_SEGMENTS
-    need(total, tof, ve, d, p, out)
-    base = math.log(total)
+        return over_floor(total, out)
+    base = math.log(z * QUICK_SEGMENTS)
+    geometry(m1, elements[0], elements[1], tof, ve, near, feature_work[1][4], out)
+    need(z * QUICK_SEGMENTS, tof, ve, d, p, out)
     o = N_GEOMETRY + N_NEED
     for end in range(2):
-        end_features(scaled[end], ends[2 + end], ends[end], total, axes, out[o : o + N_END])
+        end_features(
+            scaled[end], ends[2 + end], ends[end], z * QUICK_SEGMENTS, axes, out[o : o + N_END]
+        )
         o += N_END
     for end in range(2):
         impulse = weights[QUICK_SEGMENTS + end] * g[3 * N_NODES + QUICK_SEGMENTS + end]
-        out[o + end] = min(impulse / (impulse + total), 1.0)
-    o += 2
-    for revs in range(MAX_REVS + 1):
-        b = revs if revs == 0 else 2 * revs - 1
-        if revs > 0 and over[b + 1] < over[b]:
-            b += 1
-        out[o] = log_ratio(max(over[b] / unit, 1e-12), base)
-        out[o + 1] = SATURATED
-        if over[b] < SATURATED:
-            out[o + 1] = left_acceleration(b, s0, s1, bounds, speed, ends_work) / unit
-        out[o + 1] = log_ratio(max(out[o + 1], 1e-12), base)
-        o += 2
+        out[o + end] = min(impulse / (impulse + z * QUICK_SEGMENTS), 1.0)
+    out[o + 2] = clip(math.log(max(total / unit, 1e-12)) - base, -1.5, 1.5)
+    out[o + 3] = log_ratio(max(over[0] / unit, 1e-12), base)
+    left = SATURATED
+    if over[0] < SATURATED:
+        left = left_acceleration(int(0), s0, s1, bounds, speed, ends_work) / unit
+    out[o + 4] = log_ratio(max(left, 1e-12), base)
     floor = math.log(LEAST_ACCELERATION)
-    if over[branch] == 0.0:
+    if total == 0.0:
         return floor
-    return max(base + math.log(mu / length / length * unit / tof / a), floor)
+    return max(base + math.log(mu / length / length / tof / (a * a)), floor)
 
 
 @inner_kernel

@@ -34,14 +34,16 @@ _ENDS: Final = tuple(
 _DUALS: Final = tuple(
     f"{name}_{end}" for end in ("dep", "arr") for name in ("dual", "excess_share", "cosine")
 )
-_KINDS: Final = ("lambert", "body", "circle", "cut")
+_KINDS: Final = ("lambert", "body", "cut")
 
 FREE_QUICK_FEATURES: Final = (
     *QUICK_FEATURES[:34],
     *_ENDS,
     "linear_excess_dep",
     "linear_excess_arr",
-    *(f"log_{name}_{revs}_rev" for revs in range(3) for name in ("lambert_left", "mima_left")),
+    "log_first_round",
+    "log_lambert_left",
+    "log_mima_left",
 )
 """Names of the features that cost little, all without unit; the leg's own 34 come first."""
 
@@ -49,11 +51,12 @@ FREE_FEATURES: Final = (
     *FEATURES,
     *_ENDS,
     *_DUALS,
-    *(f"log_free_round_{k}" for k in range(4)),
+    *(f"log_free_round_{k}" for k in range(7)),
     *(f"log_free_{kind}" for kind in _KINDS),
     *(f"log_lambert_left_{revs}_rev" for revs in range(3)),
     "log_free_second",
     "from_lambert",
+    "moved_known",
 )
 """Names of all features, all without unit. `FEATURES` are those between the moved ends."""
 

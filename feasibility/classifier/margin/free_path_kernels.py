@@ -16,8 +16,8 @@ from the last excess velocity. After each round the path begins and ends with th
 velocities found, and d is exact for these.
 
 The first path is one of several: Lambert's arcs, on which two impulses at the ends are exact, and
-paths in element space from the bodies' own velocities, from those of an orbit that touches (at an
-end without bound), or from those of the best Lambert arc, cut to the bounds.
+paths in element space, from the bodies' own velocities (at an end without bound: from that of an
+orbit that touches there), or from those of the best Lambert arc, cut to the bounds.
 
 The nodes of a path are the segments' centres, followed by both ends. Units: gravitational
 parameter 1, the larger distance from it 1; axes: departure position and orbital plane of the
@@ -66,8 +66,8 @@ SEGMENTS = 16
 """Fewer than the legs have: the excess velocities hardly depend on it."""
 
 BRANCHES = 1 + 2 * MAX_REVS
-N_STARTS = BRANCHES + 7
-ROUNDS = 3
+N_STARTS = BRANCHES + 4
+ROUNDS = 6
 BALLISTIC = 100
 
 _DEP = SEGMENTS
@@ -83,9 +83,6 @@ _SLOWEST = 0.3
 # int() at the calls: numba would compile a kernel once for each literal number of steps.
 _FIRST_STEPS = 3
 _NEXT_STEPS = 2
-_LAG_FIRST = 2.0
-_LAG_SECOND = 1.4
-_LAG_NEXT = 1.2
 _NEEDED_ROUNDS = 2
 
 
@@ -216,12 +213,12 @@ def bounded_impulse(
 
 
 @inner_kernel
-def read_excess(end: int, bound: float, own: _Array, work: EndsWork) -> None:
+def read_excess(end: int, bound: float, own: _Array, segments: int, work: EndsWork) -> None:
     """Write the excess velocity that the last solution has at an end, within its bound."""
     path_work, ends, _, _, local, _, _, _, _, _, _, _ = work
     weights, g = path_work[3], path_work[4]
     state, excess = ends[end], ends[2 + end]
-    i = SEGMENTS + end
+    i = segments + end
     scale = weights[i] if end == 0 else -weights[i]
     local_axes(state, state[3:], local)
     size = 0.0
@@ -335,8 +332,8 @@ def lay_lambert(
 
 
 @inner_kernel
-def touching_excess(own: _Array, other: _Array, circular: bool, excess: _Array) -> None:
-    """Write the excess of an orbit with an apsis here: a circle, or as far as the other end.
+def touching_excess(own: _Array, other: _Array, excess: _Array) -> None:
+    """Write the excess of an orbit with an apsis here, and the other as far as the other end.
 
     In the plane through this position that is nearest to the other's orbital plane.
     """
@@ -347,10 +344,22 @@ def touching_excess(own: _Array, other: _Array, circular: bool, excess: _Array) 
     hz = other[0] * other[4] - other[1] * other[3]
     tx, ty, tz = hy * own[2] - hz * own[1], hz * own[0] - hx * own[2], hx * own[1] - hy * own[0]
     t = math.sqrt(tx * tx + ty * ty + tz * tz)
-    speed = math.sqrt(1.0 / r if circular else 2.0 / r - 2.0 / (r + far)) / max(t, 1e-12)
+    speed = math.sqrt(2.0 / r - 2.0 / (r + far)) / max(t, 1e-12)
     excess[0] = tx * speed - own[3]
     excess[1] = ty * speed - own[4]
     excess[2] = tz * speed - own[5]
+
+
+@inner_kernel
+def own_excess(s0: _Array, s1: _Array, dep: float, arr: float, ends: _Array) -> None:
+    """Write the excess velocities of paths from the bodies' own orbits: 0, if there are bounds."""
+    for j in range(3):
+        ends[2, j] = 0.0
+        ends[3, j] = 0.0
+    if arr == np.inf:
+        touching_excess(s1, s0, ends[3])
+    if dep == np.inf:
+        touching_excess(s0, s1, ends[2])
 
 
 @inner_kernel
@@ -361,7 +370,7 @@ def lay_start(
     path_work, ends, elements, _, _, v1, v2, _, _, _, _, _ = work
     if q < BRANCHES:
         return lay_lambert(q, s0, s1, tof, dep, arr, work)
-    beside = (0, 1, -1, 0, 1, -1, 0)[q - BRANCHES]
+    beside = (0, 1, -1, 0)[q - BRANCHES]
     if q == N_STARTS - 1:
         best = cheapest_branch(s0, s1, dep, arr, work)
         if best < 0:
@@ -369,24 +378,28 @@ def lay_start(
         cut_excess(v1[best], s0, dep, ends[2])
         cut_excess(v2[best], s1, arr, ends[3])
     else:
-        circular = q >= BRANCHES + 3
-        if circular and dep < np.inf and arr < np.inf:
-            return False
-        for j in range(3):
-            ends[2, j] = 0.0
-            ends[3, j] = 0.0
-        if arr == np.inf:
-            touching_excess(s1, s0, circular, ends[3])
-        if dep == np.inf:
-            touching_excess(s0, s1, circular, ends[2])
+        own_excess(s0, s1, dep, arr, ends)
     if not lay_ends(s0, s1, ends, elements):
         return False
+    lay_first(tof, beside, int(SEGMENTS), elements, path_work)
+    return lay_problem(tof, dep, arr, int(SEGMENTS), ends, elements, path_work)
+
+
+@inner_kernel
+def lay_first(
+    tof: float, beside: int, segments: int, elements: _Array, path_work: PathWork
+) -> float:
+    """Write the first path between two ends; return by how much it goes beyond the mean motion.
+
+    `beside` is the number of revolutions, counted from the nearest one.
+    """
     x0, x1 = elements[0], elements[1]
     mean = 0.5 * tof * (x0[0] + x1[0])
     x1[5] -= _TWO_PI * (np.rint((x1[5] - x0[5] - mean) / _TWO_PI) - beside)
+    excess = x1[5] - x0[5] - mean
     least = _LEAST_MOTION if beside == 0 else 0.0
-    first_path(x0, x1, tof, x1[5] - x0[5] - mean, least, int(SEGMENTS), path_work[0])
-    return lay_problem(tof, dep, arr, int(SEGMENTS), ends, elements, path_work)
+    first_path(x0, x1, tof, excess, least, segments, path_work[0])
+    return float(excess)
 
 
 @inner_kernel
@@ -404,6 +417,12 @@ def cheapest_branch(s0: _Array, s1: _Array, dep: float, arr: float, work: EndsWo
             if best < 0 or over[b] < over[best]:
                 best = b
     return best
+
+
+@inner_kernel
+def lag(k: int) -> float:
+    """Return how far behind the best one a start may be before its k-th round."""
+    return (2.0, 1.4, 1.2, 1.08, 1.02, 1.02)[k - 1]
 
 
 @inner_kernel
@@ -439,10 +458,10 @@ def pursue(
     for k in range(1, ROUNDS + 1):
         z_rounds[k] = z
     for k in range(1, ROUNDS + 1):
-        if z > (_LAG_FIRST if k == 1 else _LAG_SECOND if k == 2 else _LAG_NEXT) * rival:
+        if z > lag(k) * rival:
             return z
-        read_excess(int(0), dep, s0, work)
-        read_excess(int(1), arr, s1, work)
+        read_excess(int(0), dep, s0, int(SEGMENTS), work)
+        read_excess(int(1), arr, s1, int(SEGMENTS), work)
         for j in range(6):
             before[0, j], before[1, j] = ends[0, j], ends[1, j]
         bound_path = lay_ends(s0, s1, ends, elements)
@@ -472,8 +491,8 @@ def pursue(
         z = value
         for j in range(k, ROUNDS + 1):
             z_rounds[j] = z
-    read_excess(int(0), dep, s0, work)
-    read_excess(int(1), arr, s1, work)
+    read_excess(int(0), dep, s0, int(SEGMENTS), work)
+    read_excess(int(1), arr, s1, int(SEGMENTS), work)
     return z
 
 

@@ -128,8 +128,8 @@ def follow(
     for _ in range(_ROUNDS):
         if not total < SATURATED:
             return SATURATED
-        read_excess(int(0), dep, s0, work)
-        read_excess(int(1), arr, s1, work)
+        read_excess(int(0), dep, s0, int(SEGMENTS), work)
+        read_excess(int(1), arr, s1, int(SEGMENTS), work)
         for j in range(6):
             before[0, j], before[1, j] = ends[0, j], ends[1, j]
         move_part(s0, before[0], ends[2])
@@ -148,8 +148,8 @@ def follow(
         if not lay_problem(tof, dep, arr, int(SEGMENTS), ends, elements, path_work):
             return SATURATED
         total = least_bounded_impulses(ve, push, dep, arr, int(_NEXT_STEPS), bound, path_work)
-    read_excess(int(0), dep, s0, work)
-    read_excess(int(1), arr, s1, work)
+    read_excess(int(0), dep, s0, int(SEGMENTS), work)
+    read_excess(int(1), arr, s1, int(SEGMENTS), work)
     return total
 
 
