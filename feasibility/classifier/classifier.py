@@ -141,8 +141,8 @@ class FeasibilityClassifier:
     def margin(self, legs: Legs) -> NDArray[np.float64]:
         """Return (n,) the estimate of m*/m0; NaN where nothing is known.
 
-        Never inf: of a leg with free ends that needs no thrust at all it is large, some hundreds
-        or more.
+        Never inf: a leg with free ends that needs no thrust at all has about the acceleration of
+        its spacecraft in units of 1e-9 m/s2, 10 000 or more.
 
         Raises
         ------

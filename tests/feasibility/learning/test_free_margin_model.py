@@ -101,7 +101,7 @@ def test_threads_change_no_bit_of_mixed_answers(both, legs):
 def test_legs_that_need_no_thrust_have_finite_margins_and_are_kept(both):
     data = labelled_free_dataset(3000, seed=2)
     ballistic = data.take(np.flatnonzero(np.isinf(data.columns["m_star_kg"]))).legs
-    assert len(ballistic) > 20
+    assert len(ballistic) >= 5
     classifier = FeasibilityClassifier(both)
     margin = classifier.margin(ballistic)
     known = np.isfinite(margin)
