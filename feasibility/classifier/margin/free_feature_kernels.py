@@ -72,6 +72,9 @@ LEAST_ACCELERATION = 1e-9
 """m/s2: legs that need no more count as needing this. An engine of 0.1 N gives it to 100 000 t."""
 
 _LARGE = 0.7
+_AGREED = 0.05
+_SHOWN = 10.0
+_FARTHEST = 0.3
 # int() at the calls: numba would compile a kernel once for each literal number of steps.
 _QUICK_STEPS = 2
 
@@ -266,8 +269,14 @@ def free_leg_features(
     o = N_FEATURES + N_ENDS
     dual_features(tof, scaled, excess, axes, feature_work, out[o : o + N_DUALS])
     compared(best, hint + math.log(tof), ends_work, speed / unit, out[o + N_DUALS :])
-    hint += math.log(mu / (a * a))
-    return floor if best == BALLISTIC else max(hint, floor)
+    if best == BALLISTIC:
+        return floor
+    # The mean of both hints where they agree; else mostly the smaller one, as paths that do not
+    # suit their leg cost more.
+    free = math.log(max(ends_work[9][ROUNDS], 1e-12) * SEGMENTS * speed / unit / tof)
+    apart = abs(free - hint)
+    hint = 0.5 * (hint + free) - 0.5 * max(0.0, apart - _AGREED)
+    return max(hint + math.log(mu / (a * a)), floor)
 
 
 @inner_kernel
@@ -296,21 +305,40 @@ def quick_excess(
         over[0] = cut_excess(v1[0], s0, dep, ends[2]) + cut_excess(v2[0], s1, arr, ends[3])
         if over[0] == 0.0:
             return 0.0
-    if over[0] > _LARGE or not lay_ends(s0, s1, ends, elements):
-        own_excess(s0, s1, dep, arr, ends)
-        if not lay_ends(s0, s1, ends, elements):
-            return SATURATED
-    lay_first(tof, int(0), int(QUICK_SEGMENTS), elements, path_work)
-    if not lay_problem(tof, dep, arr, int(QUICK_SEGMENTS), ends, elements, path_work):
-        return SATURATED
     guess = min(over[0], _LARGE) / QUICK_SEGMENTS
-    weigh_alike(guess, dep, arr, int(QUICK_SEGMENTS), path_work)
-    z = bounded_impulse(ve, dep, arr, int(QUICK_SEGMENTS), int(_QUICK_STEPS), path_work)
-    if not 0.0 < z < SATURATED:
-        return SATURATED
-    read_excess(int(0), dep, s0, int(QUICK_SEGMENTS), ends_work)
-    read_excess(int(1), arr, s1, int(QUICK_SEGMENTS), ends_work)
-    return z * QUICK_SEGMENTS
+    for start in range(2):
+        if start == 0 and over[0] > _LARGE:
+            continue
+        if start == 1:
+            own_excess(s0, s1, dep, arr, ends)
+        if not lay_ends(s0, s1, ends, elements):
+            continue
+        lay_first(tof, int(0), int(QUICK_SEGMENTS), elements, path_work)
+        if not lay_problem(tof, dep, arr, int(QUICK_SEGMENTS), ends, elements, path_work):
+            continue
+        weigh_alike(guess, dep, arr, int(QUICK_SEGMENTS), path_work)
+        z = bounded_impulse(ve, dep, arr, int(QUICK_SEGMENTS), int(_QUICK_STEPS), path_work)
+        if not 0.0 < z < SATURATED:
+            continue
+        for end in range(2):
+            body, bound = (s0, dep) if end == 0 else (s1, arr)
+            read_excess(end, bound, body, int(QUICK_SEGMENTS), ends_work)
+            shorten(body, ends[end], ends[2 + end])
+        return z * QUICK_SEGMENTS
+    return SATURATED
+
+
+@inner_kernel
+def shorten(body: _Array, before: _Array, excess: _Array) -> None:
+    """Move an excess velocity less far from that of a state, where it would go too far."""
+    r = math.sqrt(body[0] ** 2 + body[1] ** 2 + body[2] ** 2)
+    size = 0.0
+    for j in range(3):
+        size += (body[3 + j] + excess[j] - before[3 + j]) ** 2
+    share = min(1.0, _FARTHEST / math.sqrt(max(size * r, 1e-300)))
+    for j in range(3):
+        start = before[3 + j] - body[3 + j]
+        excess[j] = start + share * (excess[j] - start)
 
 
 @inner_kernel
@@ -373,6 +401,8 @@ def free_quick_features(
     base = math.log(z * QUICK_SEGMENTS)
     geometry(m1, elements[0], elements[1], tof, ve, near, feature_work[1][4], out)
     need(z * QUICK_SEGMENTS, tof, ve, d, p, out)
+    for j in range(N_GEOMETRY):
+        out[j] = clip(out[j], -_SHOWN, _SHOWN)
     o = N_GEOMETRY + N_NEED
     for end in range(2):
         end_features(
