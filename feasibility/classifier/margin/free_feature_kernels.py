@@ -74,6 +74,7 @@ LEAST_ACCELERATION = 1e-9
 _LARGE = 0.7
 _AGREED = 0.05
 _SHOWN = 10.0
+_LEAST_LOG_IMPULSE = -9.0
 _FARTHEST = 0.3
 # int() at the calls: numba would compile a kernel once for each literal number of steps.
 _QUICK_STEPS = 2
@@ -252,6 +253,7 @@ def free_leg_features(
             return floor
         total = ends_work[9][ROUNDS] * SEGMENTS
         return max(math.log(total / tof * mu / length / length), floor)
+    show_within(out)
     unit = math.sqrt(mu / a)
     tof = tof_s * unit / a
     total = math.exp(hint) * tof
@@ -401,8 +403,7 @@ def free_quick_features(
     base = math.log(z * QUICK_SEGMENTS)
     geometry(m1, elements[0], elements[1], tof, ve, near, feature_work[1][4], out)
     need(z * QUICK_SEGMENTS, tof, ve, d, p, out)
-    for j in range(N_GEOMETRY):
-        out[j] = clip(out[j], -_SHOWN, _SHOWN)
+    show_within(out)
     o = N_GEOMETRY + N_NEED
     for end in range(2):
         end_features(
@@ -449,6 +450,14 @@ def over_floor(left: float, out: _Array) -> float:
     for j in range(N_FREE_QUICK):
         out[j] = 0.0
     return math.log(LEAST_ACCELERATION)
+
+
+@inner_kernel
+def show_within(out: _Array) -> None:
+    """Keep the geometry and the impulse within what a net is shown; nearly nothing is nothing."""
+    for j in range(N_GEOMETRY):
+        out[j] = clip(out[j], -_SHOWN, _SHOWN)
+    out[N_GEOMETRY + 6] = max(out[N_GEOMETRY + 6], _LEAST_LOG_IMPULSE)
 
 
 @inner_kernel
