@@ -29,14 +29,16 @@ from feasibility.classifier.margin.final_mass import (
     lambert_velocity,
     rendezvous_mass_inputs,
 )
+from feasibility.classifier.margin.free_fallback import (
+    known_features,
+    known_features_and_excess,
+)
 from feasibility.classifier.margin.free_features import (
     FREE_DOMAIN_QUANTITIES,
     FREE_FEATURE_SET,
     FREE_FEATURES,
     FREE_QUICK_FEATURES,
-    features_and_excess,
     free_domain_quantities,
-    free_features,
     log_free_acceleration,
     log_no_thrust,
     quick_free_features,
@@ -171,9 +173,9 @@ FREE_ENDS: Final = LegView(
     feature_set=FREE_FEATURE_SET,
     names=FREE_FEATURES,
     quick_names=FREE_QUICK_FEATURES,
-    features=free_features,
+    features=known_features,
     quick_features=quick_free_features,
-    features_and_more=features_and_excess,
+    features_and_more=known_features_and_excess,
     log_acceleration=log_free_acceleration,
     least=log_no_thrust,
     domain_names=FREE_DOMAIN_QUANTITIES,
