@@ -6,11 +6,13 @@ interrupted, and --share makes a smaller model of the same kind:
 
     python training/default_model.py --out data/default [--share 0.1] [--workers 2]
 
-1. Legs with m* of all families: `FAMILIES`; the margin nets learn from them.
+1. Legs with m* of all families: `FAMILIES`; the margin nets learn from them. Legs with free ends
+   have nets of their own, which change nothing for the others (training/join_models.py takes
+   them from one model into another).
 2. With --hard-rounds N, N times: legs that the last model is most unsure of among several
    times as many (`HARD`), and a training with them too. Not part of the default model, as
    docs/guide/classifier.md says why.
-3. Legs with minimum propellant: `final_mass_legs.LEGS`; the net for the final mass learns from
+3. Legs with minimum propellant: `final_mass_legs.LEGS`; the nets for the final mass learn from
    them.
 
 With --margin-model FILE the first two steps are left out, and only the net for the final mass
@@ -23,6 +25,7 @@ legs have the natural mix of their protocol, without draws at the boundary.
 import argparse
 import sys
 from pathlib import Path
+from typing import Any
 
 import msgspec
 from final_mass_legs import (
@@ -39,6 +42,7 @@ from feasibility.commands.cli import main as feasibility
 from feasibility.dataset import read_protocol
 from feasibility.dataset.generate import begin
 from feasibility.dataset.protocol import Protocol, SpacecraftTable
+from feasibility.dataset.samplers.free_ends import FreeEnds
 from feasibility.learning.margin.hard_examples import harder
 from feasibility.runtime.workers import worker_pool
 
@@ -57,23 +61,50 @@ FAMILIES = {
     "craft2900": (11_000, 0),
     "craft3900": (8_000, 3_000),
     "craft5000": (8_000, 0),
+    "nearby": (40_000, 10_000),
+    "launch": (40_000, 10_000),
+    "arrival": (25_000, 10_000),
+    "launch-flyby": (25_000, 10_000),
+    "flyby": (35_000, 10_000),
+    "flyby-nea": (15_000, 3_000),
+    "free": (20_000, 3_000),
+}
+# Family: what differs from the protocol like which its legs are drawn.
+DIFFERING: dict[str, dict[str, Any]] = {
+    "nearby": {"tof_days": (60.0, 600.0), "long_share": 0.0, "neighbours": 100},
+    "flyby-nea": {
+        "a_au": (0.7, 1.8),
+        "catalogue_share": 0.5,
+        "revolutions": (0.08, 0.8),
+        "free_ends": FreeEnds(arrivals=1.0, any_speed=0.9, excess_of_circular=(0.02, 0.3)),
+    },
+    "free": {"free_ends": FreeEnds(departures=0.6, arrivals=0.6, any_speed=0.4)},
 }
 # Family: legs of a round of hard examples, the most doubtful of HARD_FACTOR times as many.
 HARD = {"search": 12_000, "table1": 9_000, "nea": 14_000}
 HARD_FACTOR = 5
-NEAR_EARTH = {"nea": "limited", "neaall": "table1"}
+NEAR_EARTH = {"nea": "limited", "neaall": "table1", "nearby": "search", "flyby-nea": "flyby"}
 
 
 def protocol(family: str, tables: Path) -> Protocol:
     """Return the protocol of a family: a built-in one on an official table, masses only.
 
     craftN: random pairs like table1, with an engine of N s and flight times over a wider range.
+    nearby: neighbours near the Earth, flights of 60 to 600 days. flyby-nea: fly-bys there. free:
+    general, with excess velocities at one end or both.
     """
     table = "GTOC5-DATA.txt" if family in NEAR_EARTH else "GTOC7-DATA.txt"
     isp = family.removeprefix("craft") if family.startswith("craft") else None
-    base = "table1" if isp else NEAR_EARTH.get(family, family)
+    base = "table1" if isp else "general" if family == "free" else NEAR_EARTH.get(family, family)
     made = read_protocol(base).with_catalogue(str(tables / table))
-    changes = {"name": family, "propellant": False, "legs_per_shard": LEGS_PER_SHARD}
+    changes: dict[str, Any] = {
+        "name": family,
+        "propellant": False,
+        "legs_per_shard": LEGS_PER_SHARD,
+    }
+    differing = DIFFERING.get(family)
+    if differing:
+        changes["sampler"] = msgspec.structs.replace(made.sampler, **differing)
     if isp:
         sampler = msgspec.structs.replace(made.sampler, tof_ratio=(0.4, 3.0))
         craft = SpacecraftTable(dry_mass_kg=1000.0, thrust_n=0.236, isp_s=float(isp))

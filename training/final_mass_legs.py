@@ -2,7 +2,8 @@
 
 All can be flown: initial masses follow from m*, and each leg has several of them. The families
 are wider than those for the margins: launches from the Earth, returns, transfers to Mars,
-flights of up to four turns, and spacecraft up to 60 times lighter than m*.
+flights of up to four turns, and spacecraft up to 60 times lighter than m*. Families whose names
+begin with "free-" are those of the margins with free ends.
 """
 
 from pathlib import Path
@@ -29,6 +30,10 @@ LEGS: Final = {
     "return-belt": 14_000,
     "nea-nea": 38_000,
     "belt-belt": 28_000,
+    "free-launch": 28_000,
+    "free-arrival": 24_000,
+    "free-launch-flyby": 24_000,
+    "free-flyby": 28_000,
 }
 """Family: rows to learn from, in fours that share a leg."""
 
@@ -45,6 +50,10 @@ TESTS: Final = {
     "turns-belt": ("belt-belt", (1.0, 4.0), {"revolutions": (1.0, 4.0)}),
     "light-nea": ("nea-nea", (2.0, 60.0), {"revolutions": (0.3, 2.0)}),
     "light-belt": ("belt-belt", (2.0, 60.0), {"revolutions": (0.3, 2.0)}),
+    "free-launch": ("free-launch", (1.0, 8.0), {}),
+    "free-arrival": ("free-arrival", (1.0, 8.0), {}),
+    "free-launch-flyby": ("free-launch-flyby", (1.0, 8.0), {}),
+    "free-flyby": ("free-flyby", (1.0, 8.0), {}),
 }
 """Fresh family: family like which its legs are drawn, range of m*/m0, and what differs."""
 
@@ -59,6 +68,7 @@ _ISP: Final = (1500.0, 5000.0)
 _MASSES_PER_LEG: Final = 4
 _LEGS_PER_SHARD: Final = 1000
 _LIGHTEST: Final = {"search": 8.0, "table1": 30.0, "nea": 30.0}
+_FREE: Final = "free-"
 _MOST: Final = 60.0
 
 
@@ -88,15 +98,17 @@ def final_mass_protocol(family: str, tables: Path) -> Protocol:
         sampler = msgspec.structs.replace(made.sampler, m0_kg=(31.0, 1e6))
         craft = msgspec.structs.replace(made.spacecraft, dry_mass_kg=0.0)
         return msgspec.structs.replace(made, **changes, sampler=sampler, spacecraft=craft)
-    if family == "general":
-        made = read_protocol(family).with_catalogue(table)
+    if family == "general" or family.startswith(_FREE):
+        made = read_protocol(family.removeprefix(_FREE)).with_catalogue(table)
+        # Masses follow from m*, as far as these bounds let them; without thrust from the least.
         sampler = msgspec.structs.replace(
             made.sampler,
-            revolutions=(0.05, 4.0),
             acceleration_m_s2=(1e-6, 9e-3),
             m0_kg=(100.0, 1000.0),
             dry_share=(1e-9, 1e-9),
         )
+        if family == "general":
+            sampler = msgspec.structs.replace(sampler, revolutions=(0.05, 4.0))
         return msgspec.structs.replace(made, **changes, sampler=sampler)
     departures, arrivals = _ENDS[family.split("-")[0]]
     sampler = Transfers(

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from feasibility.classifier.artefact import Artefact
 from feasibility.classifier.margin.estimator import MarginEstimator
 from feasibility.classifier.margin.prediction import LegPrediction
+from feasibility.classifier.margin.views import FREE_ENDS
 from feasibility.classifier.model_check import check_model
 from feasibility.classifier.paper import features as paper
 from feasibility.classifier.paper.estimator import PaperEstimator
@@ -31,9 +32,9 @@ class FeasibilityClassifier:
     spacecraft. A model with the paper's features was trained for one engine;
     as only thrust over mass enters the motion, a leg with another thrust is
     asked about with its mass in proportion, and another specific impulse is
-    outside its domain. Legs with free ends (`Legs.free_ends`) are outside the domain of every
-    model so far: their probability is 0.5, their margin and final mass are NaN, and
-    `ClassifierPruner` keeps them.
+    outside its domain. A margin model may have nets for legs with free ends (`Legs.free_ends`),
+    as the default has. Such legs are outside the domain of any other model: their probability is
+    0.5, their margin and final mass are NaN, and `ClassifierPruner` keeps them.
 
     Parameters
     ----------
@@ -66,6 +67,11 @@ class FeasibilityClassifier:
             self._estimator = MarginEstimator(artefact)
         try:
             self._positive = artefact.section("calibration")["positive_scores"]
+            self._free_positive = (
+                artefact.section(FREE_ENDS.section("calibration"))["positive_scores"]
+                if self.knows_free_ends
+                else None
+            )
         except KeyError as error:
             raise InputError(f"model: array {error} is missing") from None
 
@@ -104,6 +110,12 @@ class FeasibilityClassifier:
         """Whether `margin` and all that rests on it can be asked."""
         return isinstance(self._estimator, MarginEstimator)
 
+    @property
+    def knows_free_ends(self) -> bool:
+        """Whether legs with free ends can be asked about."""
+        estimator = self._estimator
+        return isinstance(estimator, MarginEstimator) and estimator.knows_free_ends
+
     def feasible_probability(self, legs: Legs) -> NDArray[np.float64]:
         """Return (n,) the probability that each leg can be flown; never NaN.
 
@@ -128,6 +140,9 @@ class FeasibilityClassifier:
 
     def margin(self, legs: Legs) -> NDArray[np.float64]:
         """Return (n,) the estimate of m*/m0; NaN where nothing is known.
+
+        Never inf: a leg with free ends that needs no thrust at all has about the acceleration of
+        its spacecraft in units of 1e-9 m/s2, 10 000 or more.
 
         Raises
         ------
@@ -205,18 +220,30 @@ class FeasibilityClassifier:
     def threshold(self, recall: float) -> float:
         """Return the largest probability that `recall` of the calibration's feasible legs reach.
 
-        Those of a margin model have initial masses near the boundary, as on good tours.
+        Those of a margin model have initial masses near the boundary, as on good tours. Legs with
+        free ends have `thresholds` of their own.
 
         Raises
         ------
         InputError
             `recall` is not above 0 and at most 1.
         """
-        if not 0.0 < recall <= 1.0:
-            raise InputError(f"recall: {recall}, expected above 0 and at most 1")
-        # The tolerance keeps 1 - 0.99 from being a little less than a hundredth.
-        below = int((1.0 - recall) * len(self._positive) + 1e-9)
-        return float(self._positive[below])
+        return float(self._positive[_below(recall, len(self._positive))])
+
+    def thresholds(self, recall: float, legs: Legs) -> NDArray[np.float64]:
+        """Return (n,) what `threshold` is for each leg: kinds of free ends have their own.
+
+        Raises
+        ------
+        InputError
+            As for `threshold`.
+        """
+        found = np.full(len(legs), self.threshold(recall))
+        if self._free_positive is not None:
+            rows = FREE_ENDS.rows_of(legs)
+            of_kind = self._free_positive[:, _below(recall, self._free_positive.shape[1])]
+            found[rows] = of_kind[FREE_ENDS.kinds_of(legs.take(rows))]
+        return found
 
     def _margin_estimator(self) -> MarginEstimator:
         if not isinstance(self._estimator, MarginEstimator):
@@ -224,3 +251,17 @@ class FeasibilityClassifier:
                 f"model of kind {self.artefact.kind!r}: knows no margins; expected kind 'margin'"
             )
         return self._estimator
+
+
+def _below(recall: float, scores: int) -> int:
+    """Return how many of a number of scores may be lost.
+
+    Raises
+    ------
+    InputError
+        `recall` is not above 0 and at most 1.
+    """
+    if not 0.0 < recall <= 1.0:
+        raise InputError(f"recall: {recall}, expected above 0 and at most 1")
+    # The tolerance keeps 1 - 0.99 from being a little less than a hundredth.
+    return int((1.0 - recall) * scores + 1e-9)

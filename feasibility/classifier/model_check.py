@@ -7,13 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.classifier.artefact import Artefact
-from feasibility.classifier.margin.final_mass import BOUND_INPUTS, FINAL_MASS_INPUTS
+from feasibility.classifier.margin.views import FREE_ENDS, RENDEZVOUS, LegView
 from feasibility.errors import InputError
 
 _Arrays = Mapping[str, NDArray[Any]]
 
 _NETS: Final = ("model", "quick", "final_mass")
-"""Sections of a margin model that are nets."""
+"""Sections of a margin model that are nets; those for free ends have a prefix besides."""
 
 
 @final
@@ -66,44 +66,80 @@ def _one(arrays: _Arrays, name: str) -> float:
 
 
 def _check_calibration(arrays: _Arrays) -> None:
-    scores = _numbers(arrays, "positive_scores", None)
-    _expect(len(scores) > 0, "array calibration/positive_scores is empty")
+    _check_scores(_numbers(arrays, "positive_scores", None), "calibration")
+
+
+def _check_scores(scores: NDArray[Any], section: str) -> None:
+    _expect(scores.size > 0, f"array {section}/positive_scores is empty")
     _expect(
         scores.min() >= 0.0 and scores.max() <= 1.0 and bool(np.all(np.diff(scores) >= 0.0)),
-        "array calibration/positive_scores, expected rising probabilities",
+        f"array {section}/positive_scores, expected rising probabilities",
     )
 
 
 def _check_margin(artefact: Artefact) -> None:
-    for section in _NETS:
+    _check_view(artefact, RENDEZVOUS)
+    k = artefact.section("model")["weight_0"].shape[1]
+    _expect(k == len(artefact.features), f"{len(artefact.features)} features for {k} inputs")
+    if any(name.startswith(FREE_ENDS.prefix) for name in artefact.arrays):
+        _check_view(artefact, FREE_ENDS)
+        _check_kinds(artefact)
+
+
+def _check_view(artefact: Artefact, view: LegView) -> None:
+    """Check the nets for one sort of legs, and what belongs to them."""
+    quick, domain, calibration, mass = (
+        artefact.section(view.section(name))
+        for name in ("quick", "domain", "calibration", "final_mass")
+    )
+    for name in _NETS:
+        section = view.section(name)
         arrays = artefact.section(section)
-        if arrays or section != "final_mass":
+        if arrays or name != "final_mass":
             _check_net(arrays, None)
             inputs = len(_numbers(arrays, "mean", arrays["weight_0"].shape[1]))
             std = _numbers(arrays, "std", inputs)
             _expect(bool(np.all(std > 0.0)), f"array {section}/std, expected more than zero")
             _one(arrays, "unit")
-    mass = artefact.section("final_mass")
     if mass:
-        k = len(mass["mean"])
-        known = (len(BOUND_INPUTS), len(FINAL_MASS_INPUTS))
-        _expect(k in known, f"final_mass: {k} inputs, expected {known[0]} or {known[1]}")
+        k, known = len(mass["mean"]), " or ".join(str(size) for size in view.mass_sizes)
+        _expect(
+            k in view.mass_sizes, f"{view.section('final_mass')}: {k} inputs, expected {known}"
+        )
         if "error_fit" in mass:
             _numbers(mass, "error_fit", 3)
-    k = artefact.section("model")["weight_0"].shape[1]
-    _expect(k == len(artefact.features), f"{len(artefact.features)} features for {k} inputs")
-    _numbers(artefact.section("quick"), "settled", 2)
-    low = _numbers(artefact.section("domain"), "low", None)
-    _numbers(artefact.section("domain"), "high", len(low))
-    calibration = artefact.section("calibration")
-    levels = _numbers(calibration, "levels", None)
-    quantiles = _numbers(calibration, "quantiles", len(levels))
+    rows = (len(view.kinds),) if view.kinds else ()
+    _numbers(quick, "settled", *rows, 2)
+    low = _numbers(domain, "low", None)
+    _numbers(domain, "high", len(low))
+    levels = _numbers(calibration, "levels", *rows, None)
+    quantiles = _numbers(calibration, "quantiles", *levels.shape)
     _expect(
-        len(levels) > 1
+        levels.shape[-1] > 1
         and bool(np.all(np.diff(levels) >= 0.0))
         and bool(np.all(np.diff(quantiles) >= 0.0)),
-        "arrays calibration/levels and quantiles, expected rising numbers",
+        f"arrays {view.section('calibration')}/levels and quantiles, expected rising numbers",
     )
+
+
+def _check_kinds(artefact: Artefact) -> None:
+    """Check what only nets for free ends have."""
+    view = FREE_ENDS
+    for name, features in (("model", view.names), ("quick", view.quick_names)):
+        k = artefact.section(view.section(name))["weight_0"].shape[1]
+        _expect(
+            k == len(features),
+            f"{view.section(name)}: {k} inputs, expected {len(features)}",
+        )
+    domain = artefact.section(view.section("domain"))
+    _expect(domain["feature_set"].dtype.kind == "U", "array feature_set, expected a word")
+    _expect(domain["feature_set"].ndim == 0, "array feature_set, expected one word")
+    _numbers(domain, "low", len(view.domain_names))
+    _numbers(domain, "kinds", len(view.kinds))
+    scores = _numbers(
+        artefact.section(view.section("calibration")), "positive_scores", len(view.kinds), None
+    )
+    _check_scores(scores, view.section("calibration"))
 
 
 def _check_paper(artefact: Artefact) -> None:

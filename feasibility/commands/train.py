@@ -20,16 +20,19 @@ writes a checkpoint after each epoch beside the model; run the command again to
 go on after an interruption.
 
 The model "margin" learns the maximum initial mass instead, for any spacecraft, from one or
-more datasets; the learning curve is drawn beside it. "final-mass" adds to such a model, given by
---start, the mass at arrival with least propellant; the rest of the model stays as it is. Its
-datasets have propellant = true in their protocol.
+more datasets; the learning curve is drawn beside it. Legs with free ends, such as launches and
+fly-bys, get nets of their own in the same model. "free-margin" trains these alone and adds them to
+a margin model given by --start. "final-mass" adds to such a model the mass at arrival with least
+propellant. The rest of the model stays as it is. The datasets of the latter have
+propellant = true in their protocol.
 
 --tune looks for hyperparameters first, those of --set, --epochs and so on being fixed. Its trials
 are kept beside the model, and the same command goes on with them; or in a --storage that the
 same command, started several times and on any number of machines, shares.
 
   feasibility train data/search data/table1 data/general --model margin --out any.seqmodel
-  feasibility train data/flown --model final-mass --start any.seqmodel --out whole.seqmodel
+  feasibility train data/flyby --model free-margin --start any.seqmodel --out more.seqmodel
+  feasibility train data/flown --model final-mass --start more.seqmodel --out whole.seqmodel
   feasibility train data/table1 --preset dnn1 --out dnn1.seqmodel
   feasibility train data/table1 --model ensemble --balance adasyn
   feasibility train data/table1 --tune 30 --epochs 20 --out tuned.seqmodel
@@ -37,9 +40,11 @@ same command, started several times and on any number of machines, shares.
   seqsearch run mission.toml --pruner dnn1.seqmodel:0.99
 """
 
-_MODELS: Final = ("margin", "final-mass", "dnn", "ensemble", "knn", "svm", "tree")
+_MODELS: Final = ("margin", "free-margin", "final-mass", "dnn", "ensemble", "knn", "svm", "tree")
 _TUNABLE: Final = ("dnn", "ensemble", "knn", "svm", "tree")
 _DEFAULT_FEATURES: Final = 60
+_STARTED: Final = ("free-margin", "final-mass")
+"""Models that are added to another one."""
 
 
 def add_parser(commands: Any) -> None:
@@ -54,7 +59,7 @@ def add_parser(commands: Any) -> None:
         "dataset",
         nargs="+",
         metavar="DATASET",
-        help="folder of a dataset; several for margin and final-mass",
+        help="folder of a dataset; several for margin, free-margin and final-mass",
     )
     parser.add_argument("--model", choices=_MODELS, help="kind of model (default: dnn)")
     parser.add_argument(
@@ -87,7 +92,9 @@ def add_parser(commands: Any) -> None:
         help="any other hyperparameter, such as width=200; may be given several times",
     )
     parser.add_argument(
-        "--start", metavar="FILE", help='margin model that final-mass is added to, or "default"'
+        "--start",
+        metavar="FILE",
+        help='margin model that free-margin or final-mass is added to, or "default"',
     )
     parser.add_argument(
         "--tune",
@@ -122,27 +129,29 @@ def run(options: argparse.Namespace) -> int:
     out = Path(options.out or f"{name}.seqmodel")
     if not out.parent.is_dir():
         raise InputError(f"--out {out}: no folder {out.parent}")
-    if (name == "final-mass") != (options.start is not None):
-        raise InputError("--start: goes with --model final-mass, which needs it")
+    if (name in _STARTED) != (options.start is not None):
+        raise InputError("--start: goes with --model final-mass or free-margin, which need it")
     if options.storage is not None and options.tune is None:
         raise InputError("--storage: goes with --tune")
     if options.tune is not None and (options.preset is not None or name not in _TUNABLE):
         raise InputError(f"--tune: is for --model {', '.join(_TUNABLE)}, not for {name}")
-    if name == "margin":
+    if name in ("margin", "free-margin"):
         return _train_margin(options, out)
     if name == "final-mass":
         return _train_final_mass(options, out)
     if len(options.dataset) > 1:
         raise InputError(
-            f"{len(options.dataset)} datasets: only --model margin and final-mass take several"
+            f"{len(options.dataset)} datasets: only --model margin, free-margin and "
+            "final-mass take several"
         )
     return _train(options, name, out)
 
 
 def _train_margin(options: argparse.Namespace, out: Path) -> int:
+    from feasibility.classifier.classifier import FeasibilityClassifier
     from feasibility.dataset import read_dataset
     from feasibility.learning.margin.curves import draw_learning_curve
-    from feasibility.learning.margin.train import MarginRecipe, train_margin
+    from feasibility.learning.margin.train import MarginRecipe, train_free_ends, train_margin
 
     settings = _margin_settings(options)
     try:
@@ -150,30 +159,37 @@ def _train_margin(options: argparse.Namespace, out: Path) -> int:
     except TypeError as error:
         raise InputError(f"--set: {error}") from None
     checkpoint = out.with_name(out.name + ".checkpoint")
-    artefact = train_margin(
-        [read_dataset(folder) for folder in options.dataset],
-        recipe,
-        checkpoint=checkpoint,
-        on_epoch=_print_margin_epoch,
-    )
+    datasets = [read_dataset(folder) for folder in options.dataset]
+    how: dict[str, Any] = {"checkpoint": checkpoint, "on_epoch": _print_margin_epoch}
+    if options.model == "free-margin":
+        start = FeasibilityClassifier.load(options.start).artefact
+        artefact = train_free_ends(start, datasets, recipe, **how)
+    else:
+        artefact = train_margin(datasets, recipe, **how)
     artefact.save(out)
     checkpoint.unlink(missing_ok=True)
-    curve = out.with_suffix(".png")
-    draw_learning_curve(artefact, curve)
-    legs = artefact.config["legs"]
+    if options.model == "margin":
+        _print_fit("", artefact.config, artefact.metrics)
+        curve = out.with_suffix(".png")
+        draw_learning_curve(artefact, curve)
+    if any(dataset.legs.free_ends.any() for dataset in datasets):
+        _print_fit("free ends: ", artefact.config["free_ends"], artefact.metrics["free_ends"])
+    print(f"wrote {out}" + (f" and {curve}" if options.model == "margin" else ""))
+    return 0
+
+
+def _print_fit(which: str, config: Any, metrics: Any) -> None:
+    legs, measures = config["legs"], metrics["calibration"]
     print(
-        f"{legs['training']} legs for training, {legs['validation']} for validation, "
+        f"{which}{legs['training']} legs for training, {legs['validation']} for validation, "
         f"{legs['calibration']} for calibration"
     )
-    measures = artefact.metrics["calibration"]
     print(
-        "calibration legs: error of log m*, median "
+        f"{which}calibration legs: error of log m*, median "
         f"{measures['median_absolute_log_error']:.5f}, mean "
         f"{measures['mean_absolute_log_error']:.5f} (hint alone: median "
         f"{measures['hint_median_absolute_log_error']:.5f})"
     )
-    print(f"wrote {out} and {curve}")
-    return 0
 
 
 def _train_final_mass(options: argparse.Namespace, out: Path) -> int:
@@ -187,23 +203,31 @@ def _train_final_mass(options: argparse.Namespace, out: Path) -> int:
     except TypeError as error:
         raise InputError(f"--set: {error}") from None
     checkpoint = out.with_name(out.name + ".checkpoint")
+    datasets = [read_dataset(folder) for folder in options.dataset]
     artefact = train_final_mass(
         FeasibilityClassifier.load(options.start).artefact,
-        [read_dataset(folder) for folder in options.dataset],
+        datasets,
         recipe,
         checkpoint=checkpoint,
         on_epoch=_print_margin_epoch,
     )
     artefact.save(out)
     checkpoint.unlink(missing_ok=True)
-    measures = artefact.metrics["final_mass"]
-    print(
-        f"{measures['legs']} legs for training; validation legs: relative error of the final "
-        f"mass, median {measures['median_relative_error']:.5f}, "
-        f"mean {measures['mean_relative_error']:.5f}"
-    )
+    free = [dataset.legs.free_ends for dataset in datasets]
+    if not all(ends.all() for ends in free):
+        _print_final_mass("", artefact.metrics["final_mass"])
+    if any(ends.any() for ends in free):
+        _print_final_mass("free ends: ", artefact.metrics["free_ends"]["final_mass"])
     print(f"wrote {out}")
     return 0
+
+
+def _print_final_mass(which: str, measures: Any) -> None:
+    print(
+        f"{which}{measures['legs']} legs for training; validation legs: relative error of the "
+        f"final mass, median {measures['median_relative_error']:.5f}, "
+        f"mean {measures['mean_relative_error']:.5f}"
+    )
 
 
 def _margin_settings(options: argparse.Namespace) -> dict[str, Any]:

@@ -15,6 +15,7 @@ from feasibility.dataset import Dataset
 from feasibility.evaluation.metrics import Confusion, reliability, roc_curve, summary
 from feasibility.evaluation.peers import Peer, PeerOutcome, ask, near_boundary
 from feasibility.evaluation.tables import markdown_table
+from feasibility.legs import Legs
 from feasibility.runtime.atomic import atomic_path, write_json, write_text
 from feasibility.runtime.folders import make_folder
 from feasibility.runtime.provenance import provenance
@@ -68,7 +69,8 @@ class Evaluation:
         dataset has it, relative, with the share of final masses that are as near as the model
         says. ``us_per_leg`` is processor time.
     pruning : tuple of dict
-        For each of `RECALLS`: threshold, recall met, and share of the infeasible legs pruned.
+        For each of `RECALLS`: threshold (the median one, as kinds of free ends have their own),
+        recall met, and share of the infeasible legs pruned.
     true_log_margin, log_margin : (n,) float64, optional
         log(m*/m0) by the dataset and by the model, for a model that knows margins.
     peers : tuple of PeerOutcome
@@ -195,7 +197,7 @@ def evaluate(
     metrics["us_per_leg"] = 1e6 * seconds / len(y)
     true = part.columns["log_margin"]
     metrics |= near_boundary((probability >= 0.5) == y, true)
-    pruning = _pruning(classifier, y, probability, RECALLS)
+    pruning = _pruning(classifier, part.legs, y, probability)
     others = tuple(ask(peer, part.legs, y, true) for peer in peers)
     if classifier.artefact.kind != "margin":
         return Evaluation(y, probability, metrics, pruning, peers=others)
@@ -259,18 +261,19 @@ def by_family(evaluations: Mapping[str, Evaluation]) -> str:
 
 def _pruning(
     classifier: FeasibilityClassifier,
+    legs: Legs,
     y: NDArray[np.bool_],
     probability: NDArray[np.float64],
-    recalls: Sequence[float],
 ) -> tuple[dict[str, float], ...]:
     rows = []
-    for recall in recalls:
-        threshold = classifier.threshold(recall)
+    for recall in RECALLS:
+        threshold = classifier.thresholds(recall, legs)
         counts = Confusion.of(y, probability >= threshold)
         rows.append(
             {
                 "recall_asked": recall,
-                "threshold": threshold,
+                # The kinds of ends may have their own.
+                "threshold": float(np.median(threshold)),
                 "recall": counts.recall,
                 "infeasible_pruned": counts.specificity,
             }

@@ -1,7 +1,8 @@
 """What a model is compared with: closed forms, and a public network where it is installed.
 
 Each gives a score, (n,) float64: a leg is called feasible where it is 0 or more. The scores
-are logarithms of how many times the thing asked for could be had.
+are logarithms of how many times the thing asked for could be had. Of free ends they know as much
+as the pruners do: Lambert's arcs with the excess velocities cut to their bounds.
 """
 
 import importlib
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 from feasibility.constants import MU_SUN
 from feasibility.evaluation.metrics import Confusion, auc
 from feasibility.legs import Legs
-from feasibility.orbits.lambert import lambert_delta_v
+from feasibility.orbits.lambert import lambert_delta_v, with_lambert_excess
 from feasibility.orbits.mima import mima, mima2
 from feasibility.orbits.transfer_plane import in_line, levelled_targets
 
@@ -138,7 +139,11 @@ def lambert_score(legs: Legs) -> _Array:
     mass, whichever is the tighter.
     """
     exhaust = legs.exhaust_velocity
-    needed = lambert_delta_v(legs.rv_dep, _targets(legs), legs.tof_s, MAX_REVS)
+    needed = lambert_delta_v(
+        *(legs.rv_dep, _targets(legs), legs.tof_s, MAX_REVS),
+        vinf_dep=legs.vinf_dep,
+        vinf_arr=legs.vinf_arr,
+    )
     with np.errstate(divide="ignore"):
         heaviest = legs.thrust * legs.tof_s / (exhaust * -np.expm1(-needed / exhaust))
         room = np.log(legs.m0 / legs.m_dry) - needed / exhaust
@@ -147,11 +152,30 @@ def lambert_score(legs: Legs) -> _Array:
 
 
 def _heavy(estimate: Callable[..., _Array], legs: Legs) -> _Array:
-    mass = estimate(
-        legs.rv_dep, _targets(legs), legs.tof_s, legs.thrust, legs.exhaust_velocity, MAX_REVS
-    )
+    rv_dep, rv_arr, thrustless = _ends(legs)
+    mass = estimate(rv_dep, rv_arr, legs.tof_s, legs.thrust, legs.exhaust_velocity, MAX_REVS)
     with np.errstate(divide="ignore", invalid="ignore"):
-        return _kept_in_line(legs, np.asarray(np.log(mass / legs.m0)))
+        score = np.asarray(np.log(mass / legs.m0))
+    return _kept_in_line(legs, np.where(thrustless, np.inf, score))
+
+
+def _ends(legs: Legs) -> tuple[_Array, _Array, NDArray[np.bool_]]:
+    """Return end states as those who know no free ends are asked, and which legs need no thrust.
+
+    Free ends have the excess velocity of the Lambert arc of which least is left, cut to its bound.
+    """
+    rv_dep, rv_arr = legs.rv_dep, _targets(legs)
+    thrustless = np.zeros(len(legs), dtype=np.bool_)
+    free = np.flatnonzero(legs.free_ends)
+    if len(free):
+        rv_dep, rv_arr = rv_dep.copy(), rv_arr.copy()
+        some = legs.take(free)
+        rv_dep[free], rv_arr[free], rest = with_lambert_excess(
+            *(some.rv_dep, rv_arr[free], some.tof_s, some.vinf_dep, some.vinf_arr),
+            max_revs=MAX_REVS,
+        )
+        thrustless[free] = rest == 0.0
+    return rv_dep, rv_arr, thrustless
 
 
 def _targets(legs: Legs) -> _Array:
@@ -172,9 +196,11 @@ def _neural_score(package: Any, legs: Legs) -> _Array:
     """
     folder = Path(package.__file__).parent / "models" / "eigen_model_tmin_large"
     predictor = package.EigenFastPredictor(str(folder))
+    free = legs.free_ends.any()
+    rv_dep, rv_arr = _ends(legs)[:2] if free else (legs.rv_dep, legs.rv_arr)
     rows = np.column_stack(
         [
-            *(legs.rv_dep, legs.rv_arr, legs.tof_s, legs.m0, legs.thrust, legs.isp),
+            *(rv_dep, rv_arr, legs.tof_s, legs.m0, legs.thrust, legs.isp),
             np.full(len(legs), MU_SUN),
         ]
     )

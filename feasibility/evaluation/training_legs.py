@@ -24,7 +24,12 @@ def trained_on(artefact: Artefact, metadata: Mapping[str, Any]) -> bool:
         Those of the dataset.
     """
     provenance = artefact.provenance
-    learned = [*_records(provenance.get("datasets")), *_records([provenance.get("dataset")])]
+    free = provenance.get("free_ends")
+    learned = [
+        *_records(provenance.get("datasets")),
+        *_records([provenance.get("dataset")]),
+        *_records(free.get("datasets") if isinstance(free, Mapping) else None),
+    ]
     return _recipe(metadata) in [_recipe(record) for record in learned]
 
 

@@ -35,7 +35,8 @@ class ClassifierPruner:
     Attributes
     ----------
     threshold : float
-        Least probability of a leg that is kept.
+        Least probability of a leg from rest to rest that is kept; legs with free ends have
+        thresholds by kind, `FeasibilityClassifier.thresholds`.
 
     Raises
     ------
@@ -76,4 +77,9 @@ class ClassifierPruner:
         """
         threads = self.threads or own_threads()
         probability, inside = self.classifier.assess(legs, threads)
-        return (probability >= self.threshold) | ~inside, ~inside
+        threshold = self.thresholds(legs) if legs.free_ends.any() else self.threshold
+        return (probability >= threshold) | ~inside, ~inside
+
+    def thresholds(self, legs: Legs) -> NDArray[np.float64]:
+        """Return (n,) the least probability with which each leg is kept."""
+        return self.classifier.thresholds(self.recall, legs)

@@ -9,7 +9,7 @@ from feasibility.dataset import Dataset, read_protocol
 from feasibility.dataset.columns import ARRIVAL_STATE, COLUMNS, DEPARTURE_STATE
 from feasibility.dataset.storage import shard_path, write_metadata, write_shard
 from feasibility.orbits import synthetic_main_belt
-from feasibility.orbits.lambert import lambert_delta_v
+from feasibility.orbits.lambert import lambert_delta_v, with_lambert_excess
 from feasibility.orbits.mima import mima
 
 
@@ -59,6 +59,41 @@ def labelled_dataset(legs: int = 1500, seed: int = 0, bodies: int = 40) -> Datas
         "catalogue": {"bodies": bodies, "source": "synthetic main belt"},
     }
     return Dataset(typed, metadata)
+
+
+@functools.cache
+def labelled_free_dataset(legs: int = 1500, seed: int = 0, bodies: int = 40) -> Dataset:
+    """Return the legs of `labelled_dataset` with free ends of all kinds, labelled as quickly.
+
+    The closed form is asked about the ends of a Lambert arc with its excess cut to the bounds;
+    m* is inf where nothing is left to do.
+    """
+    rest = labelled_dataset(legs, seed, bodies)
+    rng = np.random.default_rng([seed, 1])
+    bounds = rng.uniform(200.0, 3000.0, (2, legs))
+    kind = rng.integers(1, 6, legs)
+    vinf_dep = np.where(np.isin(kind, (1, 3, 5)), bounds[0], 0.0)
+    vinf_arr = np.where(kind >= 4, np.inf, np.where(kind >= 2, bounds[1], 0.0))
+    flown = rest.legs
+    departure, arrival, left = with_lambert_excess(
+        *(flown.rv_dep, flown.rv_arr, flown.tof_s, vinf_dep, vinf_arr)
+    )
+    m_star = 2.0 * mima(departure, arrival, flown.tof_s, flown.thrust, flown.exhaust_velocity)
+    m_star[left == 0.0] = np.inf
+    log_margin = np.log(m_star / flown.m0)
+    changes = {
+        "vinf_dep_m_s": vinf_dep,
+        "vinf_arr_m_s": vinf_arr,
+        "m_star_kg": m_star,
+        "log_margin": log_margin,
+        "status": np.where(log_margin >= 0, 0, 3),
+    }
+    typed = {
+        column.name: np.asarray(changes[column.name], column.dtype)
+        for column in COLUMNS
+        if column.name in changes
+    }
+    return Dataset({**rest.columns, **typed}, rest.metadata)
 
 
 def write_dataset(dataset: Dataset, folder: Path) -> Path:

@@ -5,6 +5,7 @@ nearer it comes to a few impulses. So the velocity change is at most that at m*.
 least sum of impulses along a path in element space (`propellant_kernels`); the net corrects it.
 """
 
+from collections.abc import Callable
 from typing import Final
 
 import numpy as np
@@ -17,6 +18,10 @@ from feasibility.constants import MU_SUN
 from feasibility.legs import Legs
 
 _Array = NDArray[np.float64]
+
+MassInputs = Callable[[Legs, _Array, _Array, _Array, int], tuple[_Array, _Array]]
+"""Legs, features, what else their computation gave (n, e), log(m*/m0) (n,) and the number of a
+net's inputs to those inputs (n, k), and (n,) m/s, the velocity change that it corrects."""
 
 BOUND_INPUTS: Final = (
     *FEATURES,
@@ -106,6 +111,31 @@ def inputs_and_base(legs: Legs, X: _Array, log_margin: _Array) -> tuple[_Array, 
     return inputs, np.where(known, np.minimum(hint[:, 3], full), full)
 
 
+def rendezvous_mass_inputs(
+    legs: Legs,
+    X: _Array,
+    more: _Array,  # noqa: ARG001 (there is no more)
+    log_margin: _Array,
+    size: int,
+) -> tuple[_Array, _Array]:
+    """Return the net's inputs (n, size), and (n,) m/s, the velocity change that it corrects.
+
+    Parameters
+    ----------
+    legs, X, log_margin
+        As for `final_mass_inputs`.
+    more : (n, 0) float64
+        Nothing.
+    size : int
+        Inputs of the net: those of `BOUND_INPUTS` where it is from before the hint.
+    """
+    if size != len(BOUND_INPUTS):
+        return inputs_and_base(legs, X, log_margin)
+    margin = np.maximum(log_margin, 0.0)
+    base = full_thrust_velocity(legs, margin)
+    return _bound_inputs(legs, X, margin, base), base
+
+
 def _bound_inputs(legs: Legs, X: _Array, margin: _Array, full: _Array) -> _Array:
     inputs = np.empty((len(legs), len(BOUND_INPUTS)))
     ratio = np.log(lambert_velocity(legs, X) / full)
@@ -166,6 +196,9 @@ def final_mass(
     margin_error: _Array,
     net: MarginNet | None,
     error_fit: _Array = AS_IT_SAYS,
+    mass_inputs: MassInputs = rendezvous_mass_inputs,
+    lambert: Callable[[Legs, _Array], _Array] = lambert_velocity,
+    more: _Array | None = None,
 ) -> tuple[_Array, _Array]:
     """Return the mass at arrival with least propellant and the error to expect.
 
@@ -180,6 +213,12 @@ def final_mass(
         Estimates log(velocity change / the base's); without it, the smaller bound is the answer.
     error_fit : (3,) float64
         As for `log_expected_error`.
+    mass_inputs : callable
+        What the net sees and corrects.
+    lambert : callable
+        Legs and features to the bound by Lambert's arcs, (n,) m/s.
+    more : (n, e) float64, optional
+        What `mass_inputs` wants besides.
 
     Returns
     -------
@@ -188,17 +227,20 @@ def final_mass(
     """
     most = np.maximum(legs.m0 - legs.thrust * legs.tof_s / legs.exhaust_velocity, 0.0)
     mass, error = most, np.full(len(legs), np.nan)
+    more = np.empty((len(legs), 0)) if more is None else more
     rows = np.flatnonzero(log_margin >= _NEARLY_FLYABLE)
     if not len(rows):
         return mass, error
     if len(rows) < len(legs):
         legs, X, log_margin, most = legs.take(rows), X[rows], log_margin[rows], most[rows]
-        margin_error = margin_error[rows]
+        margin_error, more = margin_error[rows], more[rows]
     if net is None:
         full = full_thrust_velocity(legs, np.maximum(log_margin, 0.0))
-        change, doubt = np.minimum(full, lambert_velocity(legs, X)), np.full(len(rows), np.nan)
+        change, doubt = np.minimum(full, lambert(legs, X)), np.full(len(rows), np.nan)
     else:
-        change, doubt = _corrected(legs, X, log_margin, net)
+        inputs, base = mass_inputs(legs, X, more, log_margin, net.inputs)
+        correction, doubt = net(inputs)
+        change = base * np.exp(correction)
         doubt = np.exp(log_expected_error(doubt, margin_error, error_fit))
     # More than full thrust all the time cannot be burnt.
     left = np.maximum(legs.m0 * np.exp(-change / legs.exhaust_velocity), most)
@@ -206,16 +248,3 @@ def final_mass(
     share = np.minimum(doubt * change / legs.exhaust_velocity, 1.0)
     error[rows] = legs.m0 * np.exp(-change / legs.exhaust_velocity) * share
     return mass, error
-
-
-def _corrected(legs: Legs, X: _Array, log_margin: _Array, net: MarginNet) -> tuple[_Array, _Array]:
-    """Return (n,) m/s, the velocity change, and the expected error of its logarithm."""
-    if net.inputs == len(BOUND_INPUTS):
-        # A model from before the hint.
-        margin = np.maximum(log_margin, 0.0)
-        base = full_thrust_velocity(legs, margin)
-        correction, doubt = net(_bound_inputs(legs, X, margin, base))
-    else:
-        inputs, base = inputs_and_base(legs, X, log_margin)
-        correction, doubt = net(inputs)
-    return base * np.exp(correction), doubt

@@ -7,11 +7,7 @@ from typing import Final, final
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.classifier.margin.features import (
-    log_acceleration,
-    margin_features,
-    quick_features,
-)
+from feasibility.classifier.margin.views import RENDEZVOUS, LegView
 from feasibility.dataset import Dataset
 from feasibility.dataset.splits import pairs_of_bodies
 from feasibility.errors import InputError
@@ -31,16 +27,19 @@ class MarginExamples:
 
     Attributes
     ----------
-    X, hint : (n, 80), (n,) float64
-        `margin_features`.
-    X_quick, quick_hint : (n, 40), (n,) float64
-        `quick_features`; the hint is NaN where there is none.
+    X, hint : (n, k), (n,) float64
+        Features of the view.
+    X_quick, quick_hint : (n, q), (n,) float64
+        Its quick features; the hint is NaN where there is none.
     target : (n,) float64
-        `log_acceleration` at m*.
+        Logarithm of the acceleration at m*, in the unit of the view; at least the least of all
+        hints, as legs with free ends may need no thrust at all.
     weight : (n,) float64
         How much a leg counts.
     pairs : (n,) int64
         Number of the unordered pair of bodies.
+    kinds : (n,) intp
+        Number of the leg's kind of ends.
     """
 
     X: _Array
@@ -50,27 +49,29 @@ class MarginExamples:
     target: _Array
     weight: _Array
     pairs: NDArray[np.int64]
+    kinds: NDArray[np.intp]
 
     @classmethod
-    def of(cls, datasets: Sequence[Dataset]) -> "MarginExamples":
-        """Compute features and targets of all legs with a known m*.
+    def of(cls, datasets: Sequence[Dataset], view: LegView = RENDEZVOUS) -> "MarginExamples":
+        """Compute features and targets of all legs of a sort with a known m*.
 
         Raises
         ------
         InputError
-            A dataset was not labelled by margin, or has legs with free ends.
+            A dataset was not labelled by margin, or has no leg of the sort.
         """
         parts = []
         for dataset, pairs in zip(datasets, pairs_of_bodies(datasets), strict=True):
             label = dataset.metadata["protocol"]["label"]
             if label != "margin":
                 raise InputError(f"margin model: a dataset is labelled by {label}, not by margin")
-            dataset.check_rendezvous("margin model")
             columns = dataset.columns
             legs = dataset.legs
-            X, hint = margin_features(legs)
-            X_quick, quick_hint = quick_features(legs)
-            target = log_acceleration(legs, columns["m_star_kg"])
+            X, hint = view.features(legs)
+            X_quick, quick_hint = view.quick_features(legs)
+            with np.errstate(divide="ignore"):
+                target = view.log_acceleration(legs, columns["m_star_kg"])
+            target = np.maximum(target, view.least())
             known = np.isfinite(target) & np.isfinite(hint)
             relevant = np.abs(columns["log_margin"]) < _RELEVANT
             parts.append(
@@ -82,6 +83,7 @@ class MarginExamples:
                     "target": target[known],
                     "weight": np.where(relevant, 1.0, _FAR_WEIGHT)[known],
                     "pairs": pairs[known],
+                    "kinds": view.kinds_of(legs)[known],
                 }
             )
         whole = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
@@ -96,3 +98,15 @@ class MarginExamples:
     def quick_error(self) -> _Array:
         """(n,) how much the target is above the quick hint."""
         return self.target - self.quick_hint
+
+
+def legs_of(datasets: Sequence[Dataset], view: LegView) -> list[Dataset]:
+    """Return the legs of one sort, without datasets that have none."""
+    parts = []
+    for dataset in datasets:
+        rows = view.rows_of(dataset.legs)
+        if len(rows) == len(dataset):
+            parts.append(dataset)
+        elif len(rows):
+            parts.append(dataset.take(rows))
+    return parts

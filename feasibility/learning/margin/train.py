@@ -1,41 +1,29 @@
 """From datasets to a margin model: one program, to be read from top to bottom."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any, Final, final
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import Any
 
 from feasibility.classifier.artefact import Artefact
-from feasibility.classifier.margin.calibration import (
-    Calibration,
-    boundary_scores,
-    fit_calibration,
-)
-from feasibility.classifier.margin.features import FEATURE_SET, FEATURES, domain_quantities
-from feasibility.classifier.margin.network import MarginNet
+from feasibility.classifier.margin.features import FEATURE_SET, FEATURES
+from feasibility.classifier.margin.views import FREE_ENDS, RENDEZVOUS
 from feasibility.dataset import Dataset
-from feasibility.dataset.splits import split_pairs
 from feasibility.errors import InputError
-from feasibility.learning.margin.examples import MarginExamples
-from feasibility.learning.margin.fit import MarginEpoch, MarginRecipe, OnEpoch, fit_net
+from feasibility.learning.margin.examples import MarginExamples, legs_of
+from feasibility.learning.margin.fit import MarginEpoch, MarginRecipe, OnEpoch
+from feasibility.learning.margin.fit_view import SHARES, fit_view
 from feasibility.runtime.provenance import provenance
 
-_Array = NDArray[np.float64]
-
-__all__ = ["SHARES", "MarginEpoch", "MarginRecipe", "OnEpoch", "train_margin"]
-
-SHARES: Final = (0.85, 0.05, 0.1)
-"""Shares of training, validation and calibration, split by pairs of bodies."""
-
-_QUICK_LAYERS: Final = (2, 64)
-_QUICK_EPOCHS: Final = 24
-_QUICK_UNIT: Final = 0.05
-_SETTLED_TAIL: Final = 1e-3
-_SETTLED_SAFETY: Final = 1.05
-_DOMAIN_SLACK: Final = 0.03
+__all__ = [
+    "SHARES",
+    "MarginEpoch",
+    "MarginRecipe",
+    "OnEpoch",
+    "train_free_ends",
+    "train_margin",
+    "with_free_ends_of",
+]
 
 
 def train_margin(
@@ -48,10 +36,11 @@ def train_margin(
 ) -> Artefact:
     """Train a margin model on the legs of one or more datasets.
 
-    One that starts from another keeps the standardisation and the domain of that one, the latter
-    widened by the new legs, and its weights where training does not improve them on the
-    validation part; its net for the final mass stays as it is. Calibration is always that of the
-    new legs.
+    Legs with free ends get nets of their own, see `train_free_ends`, and change nothing for the
+    others. A model that starts from another keeps the standardisation and the domain of that one,
+    the latter widened by the new legs, and its weights where training does not improve them on the
+    validation part; its nets for the final mass stay as they are, and those for free ends where no
+    leg has any. Calibration is always that of the new legs.
 
     Parameters
     ----------
@@ -64,7 +53,7 @@ def train_margin(
     checkpoint : Path, optional
         File rewritten after each epoch, from which an interrupted training goes on.
     on_epoch : callable, optional
-        Called after each epoch of the net, not of the quick one.
+        Called after each epoch of a large net, not of a quick one.
 
     Returns
     -------
@@ -80,159 +69,161 @@ def train_margin(
     """
     if start is None and not recipe.epochs:
         raise InputError("margin epochs: 0, expected 1 or more without a model to start from")
-    examples = MarginExamples.of(datasets)
-    parts = _Parts.of(examples, recipe)
+    rendezvous = legs_of(datasets, RENDEZVOUS)
+    if not rendezvous:
+        raise InputError(
+            "margin model: all legs have free ends (vinf_dep, vinf_arr); expected some from rest "
+            "to rest too, or --model free-margin with a model to start from"
+        )
     epochs: list[MarginEpoch] = []
+    examples = MarginExamples.of(rendezvous, RENDEZVOUS)
+    fitted = fit_view(examples, RENDEZVOUS, recipe, start, checkpoint, _noting(epochs, on_epoch))
+    kept = {} if start is None else _others(start)
+    artefact = Artefact(
+        kind="margin",
+        feature_set=FEATURE_SET,
+        features=FEATURES,
+        units=("",) * len(FEATURES),
+        arrays={**fitted.arrays(RENDEZVOUS), **kept},
+        config={
+            "recipe": asdict(recipe),
+            "legs": dict(fitted.legs),
+            "epochs": [asdict(epoch) for epoch in epochs],
+        },
+        metrics={"calibration": dict(fitted.metrics)},
+        provenance={
+            **provenance(),
+            "datasets": [_record(dataset) for dataset in rendezvous],
+            **({} if start is None else {"start": dict(start.provenance)}),
+        },
+    )
+    if start is not None and "free_ends" in start.config:
+        artefact = _with_record(artefact, start)
+    if any(dataset.legs.free_ends.any() for dataset in datasets):
+        aside = None if checkpoint is None else checkpoint.with_name(f"{checkpoint.name}-free")
+        artefact = train_free_ends(
+            artefact, datasets, recipe, start=start, checkpoint=aside, on_epoch=on_epoch
+        )
+        if aside is not None:
+            aside.unlink(missing_ok=True)
+    return artefact
 
+
+def train_free_ends(
+    artefact: Artefact,
+    datasets: Sequence[Dataset],
+    recipe: MarginRecipe,
+    *,
+    start: Artefact | None = None,
+    checkpoint: Path | None = None,
+    on_epoch: OnEpoch | None = None,
+) -> Artefact:
+    """Return a margin model with nets for legs with free ends; its other nets are kept.
+
+    Parameters
+    ----------
+    artefact : Artefact
+        A margin model. Nets for free ends that it has are replaced; the one for their final mass
+        stays only if `start` has it too.
+    datasets : sequence of Dataset
+        Legs with m*; those from rest to rest play no part.
+    recipe, checkpoint, on_epoch
+        As for `train_margin`.
+    start : Artefact, optional
+        A model whose nets for free ends are begun with, instead of random weights.
+
+    Raises
+    ------
+    InputError
+        As for `train_margin`, or no leg has free ends.
+    MissingDependencyError
+        The extra ``train`` is not installed.
+    """
+    free = legs_of(datasets, FREE_ENDS)
+    if not free:
+        raise InputError(
+            "free ends: no leg of the datasets has any; expected vinf_dep or vinf_arr above zero"
+        )
+    epochs: list[MarginEpoch] = []
+    examples = MarginExamples.of(free, FREE_ENDS)
+    fitted = fit_view(examples, FREE_ENDS, recipe, start, checkpoint, _noting(epochs, on_epoch))
+    arrays = {
+        name: array
+        for name, array in artefact.arrays.items()
+        if not name.startswith(FREE_ENDS.prefix)
+    }
+    if start is not None:
+        mass = FREE_ENDS.section("final_mass")
+        arrays |= {f"{mass}/{name}": array for name, array in start.section(mass).items()}
+    return replace(
+        artefact,
+        arrays={**arrays, **fitted.arrays(FREE_ENDS)},
+        config={
+            **artefact.config,
+            "free_ends": {
+                "recipe": asdict(recipe),
+                "legs": dict(fitted.legs),
+                "epochs": [asdict(epoch) for epoch in epochs],
+            },
+        },
+        metrics={**artefact.metrics, "free_ends": {"calibration": dict(fitted.metrics)}},
+        provenance={
+            **artefact.provenance,
+            "free_ends": {
+                **provenance(),
+                "datasets": [_record(dataset) for dataset in free],
+            },
+        },
+    )
+
+
+def with_free_ends_of(artefact: Artefact, other: Artefact) -> Artefact:
+    """Return a margin model with the nets for free ends of another one.
+
+    Raises
+    ------
+    InputError
+        The other one has none.
+    """
+    taken = {
+        name: array for name, array in other.arrays.items() if name.startswith(FREE_ENDS.prefix)
+    }
+    if artefact.kind != "margin" or not taken:
+        raise InputError("free ends: expected a margin model, and another one with nets for them")
+    arrays = {
+        name: array
+        for name, array in artefact.arrays.items()
+        if not name.startswith(FREE_ENDS.prefix)
+    }
+    return _with_record(replace(artefact, arrays={**arrays, **taken}), other)
+
+
+def _with_record(artefact: Artefact, other: Artefact) -> Artefact:
+    """Return a model with the record of how the other one's nets for free ends were trained."""
+    parts = {}
+    for name in ("config", "metrics", "provenance"):
+        record: Mapping[str, Any] = getattr(other, name)
+        more = {"free_ends": record["free_ends"]} if "free_ends" in record else {}
+        parts[name] = {**getattr(artefact, name), **more}
+    return replace(artefact, **parts)
+
+
+def _others(start: Artefact) -> dict[str, Any]:
+    """Return the arrays of a model that training on legs from rest to rest leaves as they are."""
+    return {
+        name: array
+        for name, array in start.arrays.items()
+        if name.startswith(("final_mass/", FREE_ENDS.prefix))
+    }
+
+
+def _noting(epochs: list[MarginEpoch], on_epoch: OnEpoch | None) -> OnEpoch:
     def note(epoch: MarginEpoch) -> None:
         epochs.append(epoch)
         if on_epoch is not None:
             on_epoch(epoch)
 
-    net, quick = _fit_nets(examples, parts, recipe, start, checkpoint, note)
-    # Estimates of log m* and what is wrong with them: a larger acceleration is a smaller m*.
-    error = examples.error[parts.calibration]
-    correction, expected = MarginNet(net)(examples.X[parts.calibration])
-    residual = correction - error
-    table = fit_calibration(residual, expected)
-    scores = boundary_scores(
-        Calibration(table), residual, expected, np.random.default_rng([recipe.seed, 1])
-    )
-    sections: dict[str, Mapping[str, _Array]] = {
-        "model": net,
-        "quick": {**quick, "settled": _settled(examples, parts, quick, start)},
-        "domain": _domain(examples, parts, start),
-        "calibration": {**table, "positive_scores": scores},
-        "final_mass": {} if start is None else start.section("final_mass"),
-    }
-    return Artefact(
-        kind="margin",
-        feature_set=FEATURE_SET,
-        features=FEATURES,
-        units=("",) * len(FEATURES),
-        arrays={
-            f"{section}/{name}": array
-            for section, arrays in sections.items()
-            for name, array in arrays.items()
-        },
-        config={
-            "recipe": asdict(recipe),
-            "legs": {
-                "training": len(parts.learned),
-                "validation": len(parts.validation),
-                "calibration": len(parts.calibration),
-            },
-            "epochs": [asdict(epoch) for epoch in epochs],
-        },
-        metrics={
-            "calibration": {
-                "median_absolute_log_error": float(np.median(np.abs(residual))),
-                "mean_absolute_log_error": float(np.mean(np.abs(residual))),
-                "hint_median_absolute_log_error": float(np.median(np.abs(error))),
-            }
-        },
-        provenance={
-            **provenance(),
-            "datasets": [_record(dataset) for dataset in datasets],
-            **({} if start is None else {"start": dict(start.provenance)}),
-        },
-    )
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class _Parts:
-    """Rows of the three parts, all of them or those with a rough hint."""
-
-    learned: NDArray[np.intp]
-    validation: NDArray[np.intp]
-    calibration: NDArray[np.intp]
-
-    @classmethod
-    def of(cls, examples: MarginExamples, recipe: MarginRecipe) -> "_Parts":
-        """Split by pairs of bodies.
-
-        Raises
-        ------
-        InputError
-            The legs to learn from do not fill a batch.
-        """
-        part = split_pairs(examples.pairs, SHARES, np.random.default_rng([recipe.seed, 0]))
-        parts = cls(*(np.flatnonzero(part == k) for k in range(3)))
-        if len(parts.learned) < recipe.batch:
-            raise InputError(
-                f"margin model: {len(parts.learned)} legs to learn from, expected at least one "
-                f"batch of {recipe.batch}; generate more legs"
-            )
-        return parts
-
-    def rough(self, examples: MarginExamples) -> "_Parts":
-        """Return the rows with a rough hint."""
-        has_hint = np.isfinite(examples.quick_hint)
-        return _Parts(
-            *(rows[has_hint[rows]] for rows in (self.learned, self.validation, self.calibration))
-        )
-
-
-def _fit_nets(
-    examples: MarginExamples,
-    parts: _Parts,
-    recipe: MarginRecipe,
-    start: Artefact | None,
-    checkpoint: Path | None,
-    on_epoch: OnEpoch,
-) -> tuple[dict[str, _Array], dict[str, _Array]]:
-    """Return the arrays of the net and of the quick one."""
-    net = fit_net(
-        examples.X, examples.error, examples.weight, parts.learned, parts.validation, recipe,
-        layers=recipe.layers, width=recipe.width, epochs=recipe.epochs,
-        start=None if start is None else start.section("model"),
-        checkpoint=checkpoint, on_epoch=on_epoch,
-    )  # fmt: skip
-    epochs = recipe.quick_epochs
-    if epochs is None:
-        epochs = _QUICK_EPOCHS if recipe.epochs else 0
-    rough = parts.rough(examples)
-    quick = fit_net(
-        examples.X_quick, examples.quick_error, examples.weight, rough.learned, rough.validation,
-        recipe,
-        layers=_QUICK_LAYERS[0], width=_QUICK_LAYERS[1], epochs=epochs, unit=_QUICK_UNIT,
-        heed_outliers=True, start=None if start is None else start.section("quick") or None,
-    )  # fmt: skip
-    return net, quick
-
-
-def _settled(
-    examples: MarginExamples, parts: _Parts, quick: dict[str, _Array], start: Artefact | None
-) -> _Array:
-    """Return (2,) errors of the quick net, in its own expectation, that are hardly exceeded."""
-    rows = parts.rough(examples).calibration
-    correction, expected = MarginNet(quick)(examples.X_quick[rows])
-    residual = (correction - examples.quick_error[rows]) / expected
-    settled = _SETTLED_SAFETY * np.quantile(residual, [_SETTLED_TAIL, 1.0 - _SETTLED_TAIL])
-    known = {} if start is None else start.section("quick")
-    if not known:
-        return settled
-    # Few calibration legs see few outliers: what was needed before is needed still.
-    low, high = known["settled"]
-    return np.array([min(settled[0], low), max(settled[1], high)])
-
-
-def _domain(examples: MarginExamples, parts: _Parts, start: Artefact | None) -> dict[str, _Array]:
-    """Return the ranges of the legs learned from, and of those of the model begun with."""
-    quantities = np.concatenate(
-        [
-            domain_quantities(examples.X[parts.learned]),
-            domain_quantities(examples.X_quick[parts.rough(examples).learned]),
-        ]
-    )
-    low, high = quantities.min(axis=0), quantities.max(axis=0)
-    slack = _DOMAIN_SLACK * (high - low) + 1e-9
-    low, high = low - slack, high + slack
-    if start is not None and start.section("quick"):
-        domain = start.section("domain")
-        low, high = np.minimum(low, domain["low"]), np.maximum(high, domain["high"])
-    return {"low": low, "high": high}
+    return note
 
 
 def _record(dataset: Dataset) -> dict[str, Any]:
