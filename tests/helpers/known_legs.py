@@ -60,7 +60,10 @@ def fly_bys_like_those_flown(tables: Path, n: int, seed: int) -> Legs:
     table = read_catalogue(tables / "GTOC4-DATA.txt")
     rng = np.random.default_rng(seed)
     many, days, near = 800 * n, 75.0, 0.02 * AU
-    first, passed = rng.integers(0, len(table), many), mjd_to_mjd2000(rng.uniform(57023, 61041, many))
+    first, passed = (
+        rng.integers(0, len(table), many),
+        mjd_to_mjd2000(rng.uniform(57023, 61041, many)),
+    )
     there = table.states_at(first, passed)[:, :3]
     radius = np.linalg.norm(there, axis=1)
     along = np.cross([0.0, 0.0, 1.0], there)

@@ -1,4 +1,4 @@
-"""Missions whose legs have free ends: a launch, visits that are fly-bys, an arrival with speed left.
+"""Missions whose legs have free ends: a launch, fly-bys as visits, an arrival with speed left.
 
 A problem file with a table ``[ends]`` states them; the rest of it is that of a tour of rendezvous.
 """
@@ -11,7 +11,7 @@ RULES = EndsRules
 
 
 def build(base: RendezvousProblem, rules: EndsRules) -> Problem:
-    """Return the problem; `base` has the bodies, the spacecraft, the window and all other rules."""
+    """Return the problem; `base` has bodies, spacecraft, window and all other rules."""
     # Imported here: reading any problem file looks at the rules of all problems.
     from seqsearch.problems.ends.problem import EndsProblem, with_launch_body
 

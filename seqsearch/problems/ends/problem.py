@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Final, final
+from typing import final
 
 import msgspec
 import numpy as np
@@ -18,6 +18,7 @@ from seqsearch.core.recording import tour_body
 from seqsearch.problems.ends.fly_bys import FlyBys
 from seqsearch.problems.ends.rules import EndsRules
 from seqsearch.problems.moves.earth_first import earth_first
+from seqsearch.problems.moves.freed_launch import VINF_SLACK
 from seqsearch.problems.moves.legs_between import legs_between
 from seqsearch.problems.rendezvous import RendezvousProblem
 from seqsearch.problems.variant import RendezvousVariant
@@ -26,9 +27,6 @@ from seqsearch.tours.tour import TourRules
 
 _Array = NDArray[np.float64]
 _Rows = NDArray[np.intp]
-
-_SLACK: Final = 2e-6
-"""Share of a bound that legs leave: solvers may exceed theirs by half of it."""
 
 
 def with_launch_body(base: RendezvousProblem, rules: EndsRules) -> RendezvousProblem:
@@ -97,7 +95,10 @@ class EndsProblem(RendezvousVariant):
     @property
     def visit_m_s(self) -> float:
         """Largest speed of visits: zero for rendezvous, inf for any."""
-        return 1e3 * self.rules.visit_vinf_km_s if self.passes else 0.0
+        if not self.passes:
+            return 0.0
+        bound = self.rules.visit_vinf_km_s
+        return np.inf if bound is None else 1e3 * bound
 
     @property
     def custom_moves(self) -> CustomMoves | None:
@@ -128,8 +129,8 @@ class EndsProblem(RendezvousVariant):
             nodes.mass[parent],
             least_mass=self.spacecraft.m_dry,
             departure_velocity=nodes.velocity[parent],
-            vinf_dep=(1.0 - _SLACK) * launched,
-            vinf_arr=(1.0 - _SLACK) * arrival,
+            vinf_dep=(1.0 - VINF_SLACK) * launched,
+            vinf_arr=(1.0 - VINF_SLACK) * arrival,
         )
         return Hops((legs,), (np.zeros(len(legs)),))
 
@@ -166,6 +167,6 @@ class EndsProblem(RendezvousVariant):
         return row
 
 
-def _stated(bound_m_s: float) -> float | None | UnsetType:
+def _stated(bound_m_s: float) -> float | UnsetType | None:
     """Return a largest speed as tour files state it, where no number is infinite."""
     return None if np.isinf(bound_m_s) else bound_m_s

@@ -44,8 +44,8 @@ class FlyBy(
 
     speed_min_m_s: float
     times: int = 1
-    visit_max_m_s: float | None | UnsetType = UNSET
-    last_max_m_s: float | None | UnsetType = UNSET
+    visit_max_m_s: float | UnsetType | None = UNSET
+    last_max_m_s: float | UnsetType | None = UNSET
 
     @classmethod
     def forbidden(cls) -> Self:

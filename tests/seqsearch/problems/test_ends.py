@@ -5,17 +5,20 @@ import numpy as np
 import pytest
 
 from feasibility import InputError, KeepAll
-from feasibility.constants import AU
-from feasibility.orbits import synthetic_main_belt
-from feasibility.sims_flanagan.solutions import BALLISTIC
 from seqsearch import SearchSettings, check_problem, search
 from seqsearch.core.nodes import Nodes
-from seqsearch.problems.ends.problem import EndsProblem
+from seqsearch.polish.itinerary import Itinerary
+from seqsearch.polish.retiming import retime
 from seqsearch.problems.problem_file import build_problem, read_config
+from seqsearch.refine import refine_tour
 from seqsearch.tours.events import FlyBy, Launch
+from seqsearch.tours.export.json_file import document
+from seqsearch.tours.export.protocol import Flight
+from seqsearch.tours.paths import impulsive_trajectory
 from seqsearch.tours.records import LARGEST_M_STAR_KG
 from seqsearch.tours.tour_files import read_tour, to_csv, to_json
 from seqsearch.tours.verify import verify_tour
+from seqsearch.tours.verify_rows import verify_rows
 from tests.helpers.problem_texts import GOOD
 
 
@@ -65,7 +68,7 @@ def passed(tmp_path_factory):
     [
         ("launch_vinf_km_s = 4000.0", "", "is it in m/s"),
         ("launch_vinf_km_s = -1.0", "", "launch_vinf_km_s"),
-        ("launch_vinf_km_s = inf", "", "launch_vinf_km_s inf"),
+        ("launch_vinf_km_s = inf", "", "expected a finite number"),
         ('launch_from = "mars"', "", "launch_from"),
         ('visits = "flyby"', "", "visits"),
         ('visits = "fly-by"', "", "min_stay_days = 30"),
@@ -115,7 +118,7 @@ def test_a_leg_after_a_fly_by_begins_with_the_velocity_of_the_spacecraft(tmp_pat
     velocity = np.array([[1200.0, -300.0, 50.0]])
     epoch = np.array([11000.0])
     start = passing.start_nodes(np.array([3]), epoch)
-    node = msgspec.structs.replace if False else Nodes(
+    node = Nodes(
         *(getattr(start, name) for name in Nodes.__dataclass_fields__ if name != "velocity"),
         velocity=velocity,
     )
@@ -184,6 +187,35 @@ def test_an_excess_that_is_not_flown_is_found_out(passed):
     assert "position at each arrival" in names
 
 
+def test_a_tour_of_fly_bys_is_refined_and_its_rows_verified(passed):
+    here, tour = passed
+    trajectory = refine_tour(tour).trajectory
+    bodies = {str(body.id): body for body in tour.bodies}
+    rules = here.tour_rules()
+    verification = verify_rows(trajectory, bodies, rules)
+    assert verification.passed, verification.table()
+    slow = FlyBy(speed_min_m_s=0.0, times=0, visit_max_m_s=50.0)
+    strict = msgspec.structs.replace(rules, events=(rules.events[0], slow))
+    failed = {c.name for c in verify_rows(trajectory, bodies, strict).checks if not c.passed}
+    assert "speed of visits" in failed
+    still = msgspec.structs.replace(rules, events=(slow,))
+    failed = {c.name for c in verify_rows(trajectory, bodies, still).checks if not c.passed}
+    assert "velocity at each departure" in failed
+
+
+def test_exports_have_the_excess_velocities(passed):
+    _, tour = passed
+    flight = Flight(tour, impulsive_trajectory(tour))
+    legs = document(flight)["legs"]
+    for leg, told in zip(tour.legs, legs, strict=True):
+        for end, velocity in (
+            ("departure", leg.dep_velocity_m_s),
+            ("arrival", leg.arr_velocity_m_s),
+        ):
+            np.testing.assert_allclose(told[f"{end}_excess_km_s"], np.divide(velocity, 1e3))
+    assert tour.to_dataframe().arr_speed_m_s.min() > 100.0
+
+
 def test_a_tour_of_rendezvous_may_not_pass_its_bodies(passed):
     _, tour = passed
     plain = msgspec.structs.replace(tour.rules, events=())
@@ -191,10 +223,44 @@ def test_a_tour_of_rendezvous_may_not_pass_its_bodies(passed):
     assert {"launch speed", "fly-bys of bodies met before, once each"} <= names
 
 
+@pytest.fixture(scope="module")
+def launched(tmp_path_factory):
+    """A tour that is launched from a body of the table, with its problem."""
+    here = problem(tmp_path_factory.mktemp("launched"), "launch_vinf_km_s = 2.0")
+    settings = SETTINGS.with_(starts=10, tof_days_min=120.0, tof_days_max=360.0)
+    return here, search(here, pruner=KeepAll(), settings=settings, max_solves=200).tour
+
+
+def test_a_launched_tour_goes_on_at_rest(launched):
+    here, tour = launched
+    assert len(tour.legs) >= 1
+    assert np.linalg.norm(tour.legs[0].dep_velocity_m_s) > 1.0
+    assert not any(any(leg.dep_velocity_m_s) for leg in tour.legs[1:])
+    assert not any(any(leg.arr_velocity_m_s) for leg in tour.legs)
+    assert verify_tour(tour, here.catalogue, here.tour_rules()).passed
+
+
+def test_a_launched_tour_can_be_retimed(launched):
+    here, tour = launched
+    itinerary = Itinerary.from_tour(here, tour)
+    assert itinerary.vinf_dep[0] == 2000.0
+    assert not itinerary.part(1, len(itinerary)).vinf_dep.any()
+    retimed = retime(here, itinerary, max_iterations=4)
+    assert retimed is not None
+    assert retimed.flight.itinerary.duration_days <= tour.duration_days + 1e-6
+    if retimed.flight.keeps_rules(here):
+        better = retimed.flight.to_tour(here)
+        assert verify_tour(better, here.catalogue, here.tour_rules()).passed
+
+
+def test_a_tour_of_fly_bys_has_no_itinerary_of_single_legs(passed):
+    here, tour = passed
+    with pytest.raises(InputError, match="fly-bys"):
+        Itinerary.from_tour(here, tour)
+
+
 def test_a_leg_that_needs_no_thrust_has_a_number_in_the_file(tmp_path):
-    passing = problem(
-        tmp_path, 'launch_vinf_km_s = 60.0\nvisits = "fly-by"', "min_stay_days = 0"
-    )
+    passing = problem(tmp_path, 'launch_vinf_km_s = 60.0\nvisits = "fly-by"', "min_stay_days = 0")
     settings = SETTINGS.with_(starts=2, beam_width=1, solves_per_rank=4)
     tour = search(
         passing, pruner=KeepAll(), predictor=Nothing(), settings=settings, max_solves=8
