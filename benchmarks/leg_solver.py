@@ -8,7 +8,9 @@ arrival, general-ends) it prints
 - the share of legs whose m* is within 0.2 % of the reference's or larger, worse by
   more than 0.5 %, better by more than 0.2 %; where there are legs whose reference solution
   no spacecraft flies (`burns_nearly_everything`), once more without them;
-- the share of legs the fast solver cannot confirm, which would fall back;
+- the share of equal labels (m0 <= m*) among the legs that both solve;
+- the shares of legs that the fast solver cannot confirm, which would fall back, that the
+  reference cannot, and that neither can;
 - label noise: the share of labels (m0 <= m*) that 20 more random starts flip;
 - minimum propellant at 0.6 to 1 times m*: ms a leg, ratio, and the share within 0.2 %
   of the reference's propellant or less.
@@ -114,7 +116,8 @@ def maximum_mass(name: str, legs: Legs) -> None:
     fast_start = (fast_more - fast_ms) / MORE_STARTS
     reference_start = (one_more - one_ms) / MORE_STARTS
     median = 1e3 * np.median(reference.seconds)
-    labels = (fast.m0 >= legs.m0) == (reference.m0 >= legs.m0)
+    solved = fast.converged & reference.converged
+    equal = ((fast.m0 >= legs.m0) == (reference.m0 >= legs.m0))[solved]
     thrustless = np.isinf(reference.m0) | np.isinf(fast.m0)
     both = np.isinf(reference.m0) & np.isinf(fast.m0)
     known = reference.converged & ~thrustless
@@ -131,12 +134,13 @@ def maximum_mass(name: str, legs: Legs) -> None:
         f"(median {median:.1f})   ratio {reference_ms / fast_ms:6.0f}\n"
         f"  a start    fast {fast_start:8.2f} ms   reference {reference_start:8.1f} ms"
         f"   ratio {reference_start / fast_start:6.0f}\n"
-        f"  {agreement(fast, reference, known)}   labels equal {labels.mean():.4f}\n"
+        f"  {agreement(fast, reference, known)}   labels equal {equal.mean():.4f}\n"
         f"{without}"
         f"  no thrust needed: fast {np.isinf(fast.m0).mean():.4f}, "
         f"reference {np.isinf(reference.m0).mean():.4f}, both {both.mean():.4f}\n"
         f"  not confirmed: fast {np.mean(~fast.converged):.4f}, "
-        f"reference {np.mean(~reference.converged):.4f}"
+        f"reference {np.mean(~reference.converged):.4f}, "
+        f"both {np.mean(~fast.converged & ~reference.converged):.4f}"
     )
 
 

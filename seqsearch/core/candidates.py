@@ -143,7 +143,11 @@ def grid_candidates(
 
 
 def reached(
-    problem: Problem, nodes: Nodes, candidates: Candidates, m_final: NDArray[np.float64]
+    problem: Problem,
+    nodes: Nodes,
+    candidates: Candidates,
+    m_final: NDArray[np.float64],
+    excess: NDArray[np.float64] | None = None,
 ) -> Nodes:
     """Return the n nodes to which candidates lead, not yet in the tree (tree_id -1).
 
@@ -157,6 +161,8 @@ def reached(
         n candidates.
     m_final : (n,) float64, kg
         Masses at arrival, before anything is dropped there.
+    excess : (n, 3) float64, m/s, optional
+        Velocities at arrival relative to the targets; default: at rest.
     """
     hops, parent = candidates.hops, candidates.parent
     return Nodes(
@@ -171,4 +177,5 @@ def reached(
         visited=nodes.extended_visits(parent, candidates.target),
         tree_id=np.full(len(candidates), -1, dtype=np.int64),
         parent_id=nodes.tree_id[parent],
+        velocity=np.zeros((len(candidates), 3)) if excess is None else excess,
     )

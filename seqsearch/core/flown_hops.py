@@ -10,7 +10,7 @@ from seqsearch.core.candidates import Candidates, reached
 from seqsearch.core.nodes import Nodes, no_nodes
 from seqsearch.core.optimisation import Optimised, SolvedHops
 from seqsearch.core.problem import Problem
-from seqsearch.core.tree import FlownLeg
+from seqsearch.core.tree import FlownLeg, with_excess
 
 
 @final
@@ -51,7 +51,8 @@ class FlownHops:
         if found is None:
             return cls(no_nodes(), optimised.n_hops, optimised.n_legs)
         flown = candidates.take(optimised.candidate)
-        nodes = reached(problem, parents, flown, found.solutions[-1].m_final)
+        last = found.solutions[-1]
+        nodes = reached(problem, parents, flown, last.m_final, last.arr_excess)
         return cls(nodes, optimised.n_hops, optimised.n_legs, (flown, found))
 
     def legs(self, problem: Problem, rows: NDArray[np.intp]) -> list[tuple[FlownLeg, ...]]:
@@ -73,8 +74,8 @@ class FlownHops:
                 leg = FlownLeg(
                     dep_row=int(dep_row[i]),
                     arr_row=int(arr_row[i]),
-                    rv_dep=legs.rv_dep[i],
-                    rv_arr=legs.rv_arr[i],
+                    rv_dep=with_excess(legs.rv_dep[i], solution.dep_excess[i]),
+                    rv_arr=with_excess(legs.rv_arr[i], solution.arr_excess[i]),
                     t_dep_mjd2000=float(legs.t_dep_mjd2000[i]),
                     tof_days=float(legs.tof_days[i]),
                     m0=float(solution.m0[i]),

@@ -1,7 +1,7 @@
 """`Nodes`: nodes of the search, as a struct of arrays."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Self, final
 
 import numpy as np
@@ -39,6 +39,9 @@ class Nodes(StructOfArrays):
         Id of the node in the search tree; -1 for a node that is not in it.
     parent_id : (n,) int64
         Id of the node's parent in the search tree; -1 for a start.
+    velocity : (n, 3) float64, m/s
+        Velocity relative to the body, of spacecraft that have passed it; zero, as unless given,
+        for those that are at rest there.
     """
 
     row: NDArray[np.intp]
@@ -50,6 +53,11 @@ class Nodes(StructOfArrays):
     visited: NDArray[np.intp]
     tree_id: NDArray[np.int64]
     parent_id: NDArray[np.int64]
+    velocity: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 3)))
+
+    def __post_init__(self) -> None:
+        if len(self.velocity) == 0:
+            object.__setattr__(self, "velocity", np.zeros((len(self.row), 3)))
 
     @classmethod
     def at_start(

@@ -10,7 +10,13 @@ from feasibility.orbits import Catalogue
 from feasibility.sims_flanagan.mass_convention import segment_masses, throttles_to_impulses
 from seqsearch.core.problem import Problem
 from seqsearch.core.tree import FlownLeg, SearchTree
-from seqsearch.tours.records import Impulse, State, TourBody, TourLeg
+from seqsearch.tours.records import (
+    LARGEST_M_STAR_KG,
+    Impulse,
+    State,
+    TourBody,
+    TourLeg,
+)
 from seqsearch.tours.tour import Tour
 
 _REST_M_S: Final = 1e-6
@@ -68,7 +74,7 @@ def _leg(problem: Problem, leg: FlownLeg) -> TourLeg:
         tof_days=leg.tof_days,
         m0_kg=leg.m0,
         m_final_kg=leg.m_final,
-        m_star_kg=leg.m_star,
+        m_star_kg=min(leg.m_star, LARGEST_M_STAR_KG),
         impulses=_impulses(problem, leg),
         dep_velocity_m_s=_relative(problem, leg.dep_row, leg.t_dep_mjd2000, leg.rv_dep),
         arr_velocity_m_s=_relative(problem, leg.arr_row, leg.t_arr_mjd2000, leg.rv_arr),

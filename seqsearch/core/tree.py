@@ -18,11 +18,13 @@ class FlownLeg:
     dep_row, arr_row : int
         Catalogue rows of the two bodies.
     rv_dep, rv_arr : (6,) float64, m and m/s
-        States at departure and arrival, which need not be those of the bodies.
+        States at departure and arrival, which need not be those of the bodies: the excess
+        velocities of free ends are in them.
     t_dep_mjd2000, tof_days : float
         Departure epoch and flight time.
     m0, m_final, m_star : float, kg
-        Initial, final and maximum initial mass; the margin is m_star / m0.
+        Initial, final and maximum initial mass; the margin is m_star / m0. `m_star` is inf for
+        a leg that needs no thrust.
     dropped : float, kg
         Mass that is left behind at the arrival, after `m_final`.
     throttles : (s, 3) float64
@@ -48,6 +50,13 @@ class FlownLeg:
     def t_arr_mjd2000(self) -> float:
         """Arrival epoch."""
         return self.t_dep_mjd2000 + self.tof_days
+
+
+def with_excess(state: NDArray[np.float64], excess: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the (6,) state of a spacecraft that has a velocity (3,) relative to a body in it."""
+    flown = state.copy()
+    flown[3:] += excess
+    return flown
 
 
 @final

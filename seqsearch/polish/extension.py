@@ -372,7 +372,12 @@ def _joined(kept: Itinerary, nodes: _Nodes, i: int, backward: bool) -> Itinerary
     else:
         pairs = list(zip(old, new, strict=True))
     rows, t_dep, tof = (np.concatenate(pair) for pair in pairs)
-    return Itinerary(rows, t_dep, tof)
+    rest = np.zeros(len(nodes.tof[i]))
+    ends = [
+        np.concatenate([rest, own] if backward else [own, rest])
+        for own in (kept.vinf_dep, kept.vinf_arr)
+    ]
+    return Itinerary(rows, t_dep, tof, *ends)
 
 
 def _diverse(cost: _Array, body: _Index, width: int) -> _Index:

@@ -11,8 +11,9 @@ from feasibility.sims_flanagan import solve_max_initial_mass
 from seqsearch.core.ending import ending_of
 from seqsearch.core.problem import Problem
 from seqsearch.core.recording import record_tour
-from seqsearch.core.tree import FlownLeg, SearchTree
+from seqsearch.core.tree import FlownLeg, SearchTree, with_excess
 from seqsearch.polish.itinerary import Itinerary
+from seqsearch.tours.records import LARGEST_M_STAR_KG
 from seqsearch.tours.tour import Tour
 
 _Array = NDArray[np.float64]
@@ -41,7 +42,7 @@ class Flight:
     itinerary : Itinerary
         n legs.
     m_star : (n,) float64, kg
-        Maximum initial masses.
+        Maximum initial masses, as tour files have them.
     mass : (n + 1,) float64, kg
         Mass at each departure and, last, after the last arrival.
     heaviest : LegSolutions
@@ -98,8 +99,8 @@ class Flight:
             leg = FlownLeg(
                 dep_row=int(itinerary.rows[k]),
                 arr_row=int(itinerary.rows[k + 1]),
-                rv_dep=legs.rv_dep[k],
-                rv_arr=legs.rv_arr[k],
+                rv_dep=with_excess(legs.rv_dep[k], self.solutions.dep_excess[k]),
+                rv_arr=with_excess(legs.rv_arr[k], self.solutions.arr_excess[k]),
                 t_dep_mjd2000=float(itinerary.t_dep_mjd2000[k]),
                 tof_days=float(itinerary.tof_days[k]),
                 m0=float(self.mass[k]),
@@ -158,7 +159,8 @@ def fly(problem: Problem, itinerary: Itinerary) -> Flight | None:
         if m0 == mass[k]:
             mass[k + 1] = solution.m_final[0]
         solutions.append(solution)
-    return Flight(itinerary, heaviest.m0, mass, heaviest, LegSolutions.concatenate(solutions))
+    m_star = np.minimum(heaviest.m0, LARGEST_M_STAR_KG)
+    return Flight(itinerary, m_star, mass, heaviest, LegSolutions.concatenate(solutions))
 
 
 def tangents(problem: Problem, flight: Flight) -> Tangents:
@@ -175,7 +177,8 @@ def tangents(problem: Problem, flight: Flight) -> Tangents:
     moved = Legs.concatenate([later.legs(problem, problem.m0), longer.legs(problem, problem.m0)])
     heaviest = solve_max_initial_mass(moved)
     load = flight.load
-    m_star = np.where(heaviest.converged, heaviest.m0, problem.m0)
+    largest = np.minimum(heaviest.m0, LARGEST_M_STAR_KG)
+    m_star = np.where(heaviest.converged, largest, problem.m0)
     legs = Legs.concatenate([moved, base.legs(problem, problem.m0)]).with_m0(
         np.concatenate([m_star[:n] * load, m_star[n:] * load, flight.m_star * load * _STEP_LOAD])
     )

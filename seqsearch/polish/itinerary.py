@@ -1,17 +1,22 @@
 """`Itinerary`: which bodies in which order, and when; nothing about how the legs are flown."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Self, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from feasibility import Legs
+from feasibility import InputError, Legs
 from feasibility.classifier.predictor import LegPredictor
 from seqsearch.core.ending import Ending
 from seqsearch.core.problem import Problem
 from seqsearch.core.way_home import SHORTEST_DAYS, ways_home
-from seqsearch.tours.tour import Tour
+from seqsearch.tours.events.fly_by import FlyBy
+from seqsearch.tours.events.launch import Launch
+from seqsearch.tours.tour import Tour, TourRules
+
+_SLACK = 2e-6
+"""Share of a largest speed that legs leave: solvers may exceed theirs by half of it."""
 
 
 @final
@@ -27,11 +32,20 @@ class Itinerary:
         Departure epochs.
     tof_days : (n,) float64
         Flight times, positive.
+    vinf_dep, vinf_arr : (n,) float64, m/s
+        Largest excess velocities at departures and arrivals; 0 unless given.
     """
 
     rows: NDArray[np.intp]
     t_dep_mjd2000: NDArray[np.float64]
     tof_days: NDArray[np.float64]
+    vinf_dep: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+    vinf_arr: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+
+    def __post_init__(self) -> None:
+        for name in ("vinf_dep", "vinf_arr"):
+            if len(getattr(self, name)) == 0:
+                object.__setattr__(self, name, np.zeros(len(self.tof_days)))
 
     def __len__(self) -> int:
         return len(self.tof_days)
@@ -55,15 +69,22 @@ class Itinerary:
     def from_tour(cls, problem: Problem, tour: Tour) -> Self:
         """Read sequence and timetable off a tour of this problem, with one leg or more.
 
+        The first departure may be as fast as a launch of the problem, the last arrival as its
+        rules allow.
+
         Raises
         ------
         InputError
-            A body of the tour is not in the problem's catalogue.
+            A body of the tour is not in the problem's catalogue, or visits are fly-bys: their
+            legs cannot be flown one by one.
         """
+        vinf_dep, vinf_arr = _ends(problem.tour_rules(), len(tour.legs))
         return cls(
             rows=problem.catalogue.rows_of([body.id for body in tour.bodies]).astype(np.intp),
             t_dep_mjd2000=np.array([leg.t_dep_mjd2000 for leg in tour.legs]),
             tof_days=np.array([leg.tof_days for leg in tour.legs]),
+            vinf_dep=vinf_dep,
+            vinf_arr=vinf_arr,
         )
 
     def legs(self, problem: Problem, m0: ArrayLike) -> Legs:
@@ -81,6 +102,8 @@ class Itinerary:
             thrust=craft.thrust,
             isp=craft.isp,
             m_dry=0.0,
+            vinf_dep=(1.0 - _SLACK) * self.vinf_dep,
+            vinf_arr=(1.0 - _SLACK) * self.vinf_arr,
         )
 
     def appended(self, row: int, t_dep_mjd2000: float, tof_days: float) -> Self:
@@ -89,6 +112,8 @@ class Itinerary:
             np.append(self.rows, row),
             np.append(self.t_dep_mjd2000, t_dep_mjd2000),
             np.append(self.tof_days, tof_days),
+            np.append(self.vinf_dep, 0.0),
+            np.append(self.vinf_arr, 0.0),
         )
 
     def ended(
@@ -126,4 +151,19 @@ class Itinerary:
             self.rows[first : last + 1],
             self.t_dep_mjd2000[first:last],
             self.tof_days[first:last],
+            self.vinf_dep[first:last],
+            self.vinf_arr[first:last],
         )
+
+
+def _ends(rules: TourRules, n: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return (n,) the largest excess velocities at departures and arrivals of n legs."""
+    vinf_dep, vinf_arr = np.zeros(n), np.zeros(n)
+    for event in rules.events:
+        if isinstance(event, Launch):
+            vinf_dep[:1] = event.speed_max_m_s
+        if isinstance(event, FlyBy):
+            if n > 1 and event.visit_bound(last=False) > 0.0:
+                raise InputError(f"problem {rules.name}: its visits are fly-bys, expected rest")
+            vinf_arr[-1:] = event.visit_bound(last=True)
+    return vinf_dep, vinf_arr

@@ -10,7 +10,7 @@ into the mission yet has a least duration too.
 
 from collections import deque
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, final
 
 import numpy as np
@@ -168,7 +168,7 @@ def _with_stays(problem: Problem, itinerary: Itinerary) -> Itinerary:
     t += np.clip(t[0], *problem.first_departure_mjd2000) - t[0]
     for k in range(1, len(t)):
         t[k] = max(t[k], t[k - 1] + itinerary.tof_days[k - 1] + problem.min_stay_days)
-    return Itinerary(itinerary.rows, t, itinerary.tof_days)
+    return replace(itinerary, t_dep_mjd2000=t)
 
 
 @final
@@ -305,5 +305,9 @@ def _best_in_model(
     if found is None:
         return None
     x, value = found
-    moved = Itinerary(base.rows, base.t_dep_mjd2000 + x[program.t], base.tof_days + x[program.tof])
+    moved = replace(
+        base,
+        t_dep_mjd2000=base.t_dep_mjd2000 + x[program.t],
+        tof_days=base.tof_days + x[program.tof],
+    )
     return _with_stays(problem, moved), base.duration_days + value

@@ -25,6 +25,19 @@ def smallest(values: Iterable[float], default: float = np.inf) -> float:
     return float(np.min([*values] or [default]))
 
 
+def visited_ids(legs: Iterable[TourLeg]) -> list[int]:
+    """Return the ids of the bodies that legs visit, in order; the start is none of them.
+
+    A leg that passes a body which the tour has reached before is no visit: such are fly-bys of
+    asteroids that were met at rest. Whether a body may be passed is for the rules.
+    """
+    visits: list[int] = []
+    for leg in legs:
+        if not leg.is_fly_by or leg.to_id not in visits:
+            visits.append(leg.to_id)
+    return visits
+
+
 @final
 @dataclass(frozen=True)
 class Check:

@@ -1,11 +1,13 @@
 """Tours as tables: for a terminal, a notebook and pandas."""
 
 import html
+import math
 from typing import TYPE_CHECKING, Any, Final
 
 from feasibility.constants import MJD2000_MJD
 from feasibility.errors import MissingDependencyError
 from seqsearch.tours.dates import date_of
+from seqsearch.tours.records import Vector
 
 if TYPE_CHECKING:
     from seqsearch.tours.tour import Tour
@@ -47,9 +49,15 @@ def rows(tour: "Tour") -> list[dict[str, Any]]:
             "margin": leg.margin,
             "dropped_kg": leg.dropped_kg,
             "fly_by": leg.is_fly_by,
+            "dep_speed_m_s": _speed(leg.dep_velocity_m_s),
+            "arr_speed_m_s": _speed(leg.arr_velocity_m_s),
         }
         for k, leg in enumerate(tour.legs, 1)
     ]
+
+
+def _speed(velocity: Vector) -> float:
+    return math.hypot(*velocity)
 
 
 def html_table(tour: "Tour") -> str:

@@ -1,6 +1,6 @@
 """The records that a tour is made of: bodies, legs and impulses, as the tour file has them."""
 
-from typing import final
+from typing import Final, final
 
 import msgspec
 from msgspec import UNSET, UnsetType
@@ -10,6 +10,9 @@ Vector = tuple[float, float, float]
 
 State = tuple[float, float, float, float, float, float]
 """Position in m and velocity in m/s, heliocentric J2000 ecliptic."""
+
+LARGEST_M_STAR_KG: Final = 1e7
+"""m* in files of legs with a larger one, or with none: they need no thrust at all."""
 
 
 class Record(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -35,7 +38,10 @@ class TourLeg(Record, frozen=True, kw_only=True):
     ----------
     dep_velocity_m_s, arr_velocity_m_s : tuple of float
         Velocities at departure and arrival, relative to the bodies: zero at
-        rest, otherwise that of a launch or of a fly-by.
+        rest, otherwise that of a launch, of a fly-by, or of an arrival with some speed left. How
+        large they may be is for the rules to say.
+    m_star_kg : float
+        Maximum initial mass, `LARGEST_M_STAR_KG` at most.
     dropped_kg : float
         What is left behind at the arrival.
     dep_body_state, arr_body_state : tuple of float, optional
@@ -59,7 +65,7 @@ class TourLeg(Record, frozen=True, kw_only=True):
 
     @property
     def is_fly_by(self) -> bool:
-        """Whether the leg passes its target, rather than ending at rest there."""
+        """Whether the leg ends with a velocity relative to its target, not at rest there."""
         return any(self.arr_velocity_m_s)
 
     @property

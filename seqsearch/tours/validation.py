@@ -10,14 +10,14 @@ from typing import Final
 
 from feasibility.constants import AU
 from feasibility.errors import InputError
-from seqsearch.tours.records import TourBody, TourLeg
+from seqsearch.tours.records import LARGEST_M_STAR_KG, TourBody, TourLeg
 from seqsearch.tours.tour import Tour, TourRules
 
 _MAX_MJD2000: Final = 150_000.0
 """Epochs within 400 years of 2000, as asteroid tables may have them."""
 
 _MAX_TOF_DAYS: Final = 50_000.0
-_MAX_MASS_KG: Final = 1e7
+_MAX_MASS_KG: Final = LARGEST_M_STAR_KG
 _MAX_SPEED_M_S: Final = 1e6
 _MAX_A_M: Final = 1e4 * AU
 _MAX_LEGS: Final = 10_000

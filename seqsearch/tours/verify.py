@@ -27,6 +27,7 @@ from seqsearch.tours.checks import (
     Verification,
     largest,
     smallest,
+    visited_ids,
 )
 from seqsearch.tours.ends import check_ends, visited_twice
 from seqsearch.tours.events.make import event_kinds
@@ -191,7 +192,7 @@ def _check_bodies(tour: Tour, states: _States) -> Check:
 def _check_order(tour: Tour) -> list[Check]:
     ids = [body.id for body in tour.bodies]
     chain = [(leg.from_id, leg.to_id) for leg in tour.legs]
-    stops = [ids[0], *(leg.to_id for leg in tour.legs if not leg.is_fly_by)]
+    stops = [ids[0], *visited_ids(tour.legs)]
     places = [ids[0], *(leg.to_id for leg in tour.legs)]
     linked = chain == list(pairwise(places)) and stops == ids
     repeated = visited_twice(tour.rules, ids)

@@ -26,6 +26,7 @@ from seqsearch.tours.checks import (
     Verification,
     largest,
     smallest,
+    visited_ids,
 )
 from seqsearch.tours.ends import check_ends, visited_twice
 from seqsearch.tours.events.drop import Drop
@@ -43,6 +44,9 @@ _ROW_TOLERANCE_M_S: Final = 1e-3
 
 _THRUST_TOLERANCE: Final = 1e-9
 """By how much of the full thrust a row may exceed it: the rounding of numbers in files."""
+
+_RESTING_M_S: Final = 1.0
+"""Speed up to which an arrival is taken for one at rest, where visits may be fly-bys."""
 
 _AT_REST: Final = 0.5
 """Share of the least speed of fly-bys below which an arrival is taken for a rendezvous."""
@@ -122,9 +126,10 @@ def verify_rows(
     with states_by_rules(rules, kernels) as where:
         flown = [_flown(phase, bodies, rules, where) for phase in trajectory.phases]
     legs = _legs(flown, rules)
+    ends = {f.end.id: f.end for f in flown}
     stops = (
         flown[0].start,
-        *(f.end for f, leg in zip(flown, legs, strict=True) if not leg.is_fly_by),
+        *(ends[body] for body in visited_ids(legs)),
     )
     arrivals = tuple(Arrival(f.motion.end, f.arrival) for f in flown)
     tour = FlownTour(stops, legs, arrivals)
@@ -162,12 +167,12 @@ def _flown(
 
 def _legs(flown: Sequence[_Flown], rules: TourRules) -> tuple[TourLeg, ...]:
     """Return the legs that the rows fly, without impulses, for the checks of events."""
-    slowest = max((e.speed_min_m_s for e in rules.events if isinstance(e, FlyBy)), default=np.inf)
+    fly_by = next((event for event in rules.events if isinstance(event, FlyBy)), None)
     launched = any(isinstance(event, Launch) for event in rules.events)
     legs: list[TourLeg] = []
     for k, f in enumerate(flown):
         speed = f.misses()[0][3:]
-        passes = float(np.linalg.norm(speed)) > _AT_REST * slowest
+        passes = _passes(float(np.linalg.norm(speed)), fly_by, last=f is flown[-1])
         free = (k == 0 and launched) or (k > 0 and legs[-1].is_fly_by)
         following = flown[k + 1].phase if k + 1 < len(flown) else None
         legs.append(
@@ -186,6 +191,15 @@ def _legs(flown: Sequence[_Flown], rules: TourRules) -> tuple[TourLeg, ...]:
             )
         )
     return tuple(legs)
+
+
+def _passes(speed_m_s: float, rule: FlyBy | None, *, last: bool) -> bool:
+    """Tell whether an arrival is a fly-by: fast, where the rules know such."""
+    if rule is None:
+        return False
+    if rule.visit_bound(last=last) > 0.0:
+        return speed_m_s > _RESTING_M_S
+    return rule.times > 0 and speed_m_s > _AT_REST * rule.speed_min_m_s
 
 
 def _dropped(phase: Phase, following: Phase | None, passes: bool, rules: TourRules) -> float:

@@ -153,6 +153,10 @@ def test_the_code_of_the_guide_runs(tmp_path):
     assert _output("".join(_blocks("docs/guide/python.md")), tmp_path)
 
 
+def test_the_code_about_legs_runs(tmp_path):
+    _output("".join(_blocks("docs/guide/legs.md")), tmp_path)
+
+
 @pytest.mark.slow
 def test_the_code_of_the_readme_prints_what_it_says(tmp_path):
     (block,) = _blocks("README.md")
@@ -172,13 +176,22 @@ def test_the_loop_that_the_house_shows_is_the_beams():
     assert block in (ROOT / "seqsearch" / "beam" / "beam_search.py").read_text()
 
 
-@pytest.fixture(scope="module")
-def plan():
-    """The program that draws the plan of the house."""
-    spec = importlib.util.spec_from_file_location("plan", ROOT / "docs" / "design" / "plan.py")
+def _program(path: str):
+    spec = importlib.util.spec_from_file_location("drawing", ROOT / path)
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
+
+
+@pytest.fixture(scope="module")
+def plan():
+    """The program that draws the plan of the house."""
+    return _program("docs/design/plan.py")
+
+
+def test_the_ends_of_legs_are_drawn_as_their_program_says():
+    drawn = (ROOT / "docs" / "guide" / "legs.svg").read_text(encoding="utf-8")
+    assert drawn == _program("docs/guide/legs.py").svg(), "run python docs/guide/legs.py"
 
 
 def test_the_plan_is_drawn_as_its_program_says(plan):

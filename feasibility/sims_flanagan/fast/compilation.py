@@ -39,21 +39,22 @@ def compile_kernels() -> None:
     """
     from feasibility.runtime.jit import rare_collections
 
-    legs = sample_leg()
     with rare_collections():
         with _second_process() as other:
             _compile_first_half()
             if other:
                 _wait(other[0])
-        heaviest = fast_max_initial_mass(legs)
-        # A light leg, which passes through all kernels.
-        fast_min_propellant(legs.with_m0(0.1 * heaviest.m0), guess=heaviest)
+        for legs in (sample_leg(), sample_leg(vinf_arr=1000.0)):
+            heaviest = fast_max_initial_mass(legs)
+            # A light leg, which passes through all kernels.
+            fast_min_propellant(legs.with_m0(0.1 * heaviest.m0), guess=heaviest)
 
 
 def compile_second_half() -> None:
     """Compile what needs the least of the other half; in the order in which that needs it."""
     from feasibility.runtime.jit import rare_collections
     from feasibility.sims_flanagan.fast.arc_kernels import close
+    from feasibility.sims_flanagan.fast.free_propellant_kernels import free_minimum_batch
     from feasibility.sims_flanagan.fast.newton_kernels import polish
     from feasibility.sims_flanagan.fast.propellant_kernels import minimum_batch
     from feasibility.sims_flanagan.fast.restart_kernels import minimum_restarts
@@ -66,11 +67,16 @@ def compile_second_half() -> None:
         throttles = np.zeros((1, 2, 3))
         leg = (rows, rows, numbers, numbers, numbers, 2, 1.0, throttles, numbers)
         _compile(minimum_batch, *leg)
-        _compile(minimum_restarts, *leg, np.zeros(1, dtype=np.int64))
+        whole = np.zeros(1, dtype=np.int64)
+        _compile(minimum_restarts, *leg, whole)
+        ends = (numbers, numbers, numbers, np.zeros(1, dtype=np.bool_))
+        found = (throttles, numbers, np.zeros((1, 2, 3)), whole)
+        _compile(free_minimum_batch, rows, rows, numbers, numbers, *ends, 2, 1.0, *found)
 
 
 def _compile_first_half() -> None:
     from feasibility.sims_flanagan.fast.dual_kernels import least_thrust
+    from feasibility.sims_flanagan.fast.free_kernels import free_maximum_batch
     from feasibility.sims_flanagan.fast.lifted_kernels import advance, lifted_sweep
     from feasibility.sims_flanagan.fast.maximum_kernels import maximum_batch
 
@@ -82,10 +88,13 @@ def _compile_first_half() -> None:
         *(six, six, 1.0, 2, 1, 1.0, True, True, nodes, impulses, 1.0, six, w),
     )
     _compile(advance, nodes, impulses, 2, 1.0, 1, w)
+    paths = (2, 1.0, np.zeros((1, 5, 3)), np.zeros((1, 1, 5, 3)))
+    found = (np.zeros((1, 2, 3)), numbers, np.zeros(1, dtype=np.int64), numbers)
+    _compile(maximum_batch, rows, rows, numbers, numbers, *paths, *found)
+    ends = (numbers, numbers)
     _compile(
-        maximum_batch,
-        *(rows, rows, numbers, numbers, 2, 1.0, np.zeros((1, 5, 3)), np.zeros((1, 1, 5, 3))),
-        *(np.zeros((1, 2, 3)), numbers, np.zeros(1, dtype=np.int64), numbers),
+        *(free_maximum_batch, rows, rows, numbers, numbers, *ends, *paths, *found),
+        np.zeros((1, 2, 3)),
     )
 
 
@@ -150,8 +159,11 @@ def _wait(process: "subprocess.Popen[bytes]") -> None:
         process.kill()
 
 
-def sample_leg() -> Legs:
-    """Return one leg that can be flown, for a first call of anything that looks at legs."""
+def sample_leg(vinf_arr: float = 0.0) -> Legs:
+    """Return one leg that can be flown, for a first call of anything that looks at legs.
+
+    `vinf_arr`, in m/s, makes it one with a free end.
+    """
     circular = EARTH_VELOCITY / np.sqrt(2.5)
     angle = np.radians(70.0)
     return Legs(
@@ -165,4 +177,5 @@ def sample_leg() -> Legs:
         thrust=0.5,
         isp=3000.0,
         m_dry=0.0,
+        vinf_arr=vinf_arr,
     )

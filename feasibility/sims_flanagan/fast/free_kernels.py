@@ -53,6 +53,9 @@ BRANCHES = 1 + 2 * MOST_REVS
 BALLISTIC = 60
 """Start of a leg that needs no thrust."""
 
+MODERATE = 0.7
+"""Squared eccentricity below which an ellipse is moderate."""
+
 _N_TURNS = 5
 # Slots of paths: own ends, one that waits for nothing, cut ends, Lambert's arcs, and from 20 on
 # along the departure orbit, from 23 on along the arrival orbit.
@@ -75,7 +78,6 @@ _MET = 1e-9
 _TYPICAL = (1e-5, 0.02)
 _FASTEST = 1.5
 _IN_LINE = 1e-9
-_MODERATE = 0.7
 _NUDGE = 1e-7
 
 _Array = NDArray[np.float64]
@@ -254,14 +256,14 @@ def _coasted(x: _Array, tof: float, there: _Array, w: Workspace) -> None:
 
 
 @inner_kernel
-def _make_moderate(x: _Array, other: _Array, tof: float, w: Workspace) -> None:
+def make_moderate(x: _Array, other: _Array, tof: float, w: Workspace) -> None:
     """Replace the velocity at an end where any is right, if it is not that of a moderate ellipse.
 
     By that of the other end's orbit, or else by that of a circle.
     """
     e = w.v[INNER_0]
     for attempt in range(3):
-        if to_elements(x, e) and e[1] ** 2 + e[2] ** 2 < _MODERATE:
+        if to_elements(x, e) and e[1] ** 2 + e[2] ** 2 < MODERATE:
             return
         if attempt == 0:
             _coasted(other, tof, x, w)
@@ -408,13 +410,16 @@ def _best_free_arc(
     travel = _travel(w)
     long = travel > _SHORT
     needed = _AGREEMENT + int(_WINDING * max(travel - _TURN, 0.0))
-    n_bent = bent.shape[0] if long else 0
+    n_bent = bent.shape[0]
     n_hops = _HOPS if long else 0
     spare = int(_SPARE)
     for attempt in range(N_STARTS + n_bent + n_hops + shapes.shape[0]):
         k = attempt - N_STARTS
         hop = k - n_bent
         if hop < n_hops and agreed >= needed:
+            continue
+        # Bent paths are for long legs, and for those that nothing else has closed.
+        if 0 <= k < n_bent and not long and best < np.inf:
             continue
         if k < 0:
             s = _leading(w)
@@ -521,9 +526,9 @@ def free_maximum_batch(
             body0[j] = x0[3 + j]
             body1[j] = x1[3 + j]
         if vinf_arr[row] == np.inf:
-            _make_moderate(x1, x0, tof, w)
+            make_moderate(x1, x0, tof, w)
         if vinf_dep[row] == np.inf:
-            _make_moderate(x0, x1, -tof, w)
+            make_moderate(x0, x1, -tof, w)
         if not to_elements(x0, w.v[E0]) or not to_elements(x1, w.v[E1]):
             continue
         least = np.inf

@@ -13,9 +13,11 @@ from feasibility.sims_flanagan.fast.frame_kernels import (
 )
 from feasibility.sims_flanagan.fast.free_kernels import (
     BRANCHES,
+    MODERATE,
     cut_towards,
     lambert_arcs,
     largest_excess,
+    make_moderate,
     write_excess,
 )
 from feasibility.sims_flanagan.fast.propellant_kernels import minimise_one
@@ -24,6 +26,7 @@ from feasibility.sims_flanagan.fast.workspace_kernels import (
     DV,
     E1,
     FREE,
+    INNER_0,
     LIMIT,
     STARTS,
     WORK,
@@ -120,7 +123,8 @@ def _take_lead(
 ) -> None:
     """Write the scaled excess velocities (2, 3) of open ends, zero of others.
 
-    Where any velocity is right, that of the start is as good as the body's.
+    Where any velocity is right, that of the start is as good as the body's, if it is that of a
+    moderate ellipse (`_follow`).
     """
     for j in range(3):
         leads[0, j] = leads[1, j] = 0.0
@@ -129,6 +133,40 @@ def _take_lead(
                 leads[0, j] += frame[j, k] * excess[0, k] / speed
             if arr:
                 leads[1, j] += frame[j, k] * excess[1, k] / speed
+
+
+@inner_kernel
+def _follow(x: _Array, other: _Array, tof: float, lead: _Array, w: Workspace) -> None:
+    """Add the lead to the velocity of an end; replace both where that leaves no moderate ellipse.
+
+    Elements are of ellipses alone, and a light spacecraft may well pass its target on a hyperbola:
+    the rest of its velocity is then an excess beyond that of the ellipse.
+
+    Parameters
+    ----------
+    x : (6,) float64
+        State of the body at the open end; receives the state with the lead.
+    other : (6,) float64
+        State at the other end.
+    tof : float
+        Time from there to here, negative for a departure.
+    lead : (3,) float64
+        Excess velocity of the start; receives by how much `x` has changed.
+    w : Workspace
+        Scratch.
+    """
+    own = np.empty(3)
+    e = w.v[INNER_0]
+    for j in range(3):
+        own[j] = x[3 + j]
+        x[3 + j] += lead[j]
+    if to_elements(x, e) and e[1] ** 2 + e[2] ** 2 < MODERATE:
+        return
+    for j in range(3):
+        x[3 + j] = own[j]
+    make_moderate(x, other, tof, w)
+    for j in range(3):
+        lead[j] = x[3 + j] - own[j]
 
 
 @inner_kernel
@@ -203,13 +241,14 @@ def free_minimum_batch(
         _take_lead(
             vinf_dep[row] == np.inf, vinf_arr[row] == np.inf, excess[row], speed, frame, leads
         )
-        for j in range(3):
-            x0[3 + j] += leads[0, j]
-            x1[3 + j] += leads[1, j]
-        if not to_elements(x1, target):
-            continue
         c = exhaust[row] / speed
         tof = tof_s[row] * speed / length
+        if vinf_arr[row] == np.inf:
+            _follow(x1, x0, tof, leads[1], w)
+        if vinf_dep[row] == np.inf:
+            _follow(x0, x1, -tof, leads[0], w)
+        if not to_elements(x1, target):
+            continue
         dep = largest_excess(x0, vinf_dep[row] / speed)
         arr = largest_excess(x1, vinf_arr[row] / speed)
         rows, forward = lay_timeline(tof, n, dep, arr, c * z[row], w)

@@ -25,6 +25,7 @@ from seqsearch.problems.gtoc2.prospects import Prospects
 from seqsearch.problems.gtoc2.rules import Gtoc2Rules
 from seqsearch.problems.gtoc2.transfers import Transfers
 from seqsearch.problems.moves.earth_first import earth_first
+from seqsearch.problems.moves.freed_launch import freed_launch
 from seqsearch.problems.moves.lambert_departure import lambert_departure
 from seqsearch.problems.moves.launch_epochs import launch_epochs
 from seqsearch.problems.moves.questions import Questions
@@ -157,9 +158,11 @@ class Gtoc2Problem(RendezvousVariant):
         if not enough.any():
             return None
         plans = plans.take(enough)
-        return CustomCandidates(
-            plans.parent, plans.target, self._hops(nodes, plans), m_final[enough], ask.count
-        )
+        hops = self._hops(nodes, plans)
+        if (nodes.depth == 0).any():
+            # Plans have the best of some directions. The solver finds a better one.
+            hops = freed_launch(hops, self.catalogue, self.rules.launch_speed_max_m_s)
+        return CustomCandidates(plans.parent, plans.target, hops, m_final[enough], ask.count)
 
     def _hops(self, nodes: Nodes, plans: Plans) -> Hops:
         legs = plans.legs(nodes, self.catalogue, self.spacecraft)

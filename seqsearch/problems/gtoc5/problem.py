@@ -27,6 +27,7 @@ from seqsearch.problems.gtoc5.self_fly_by import shortest_self_fly_by_days
 from seqsearch.problems.gtoc5.transfer_plans import TransferPlans
 from seqsearch.problems.moves.directions import even_directions
 from seqsearch.problems.moves.earth_first import earth_first
+from seqsearch.problems.moves.freed_launch import freed_launch
 from seqsearch.problems.moves.lambert_departure import lambert_departure
 from seqsearch.problems.moves.launch_epochs import launch_epochs
 from seqsearch.problems.variant import RendezvousVariant
@@ -148,6 +149,9 @@ class Gtoc5Problem(RendezvousVariant):
         within = known & self._leaves_room(hops.t_arr_mjd2000 - first, m_final)
         if not within.any():
             return None
+        if launch:
+            # Plans have Lambert's direction. The solver finds a better one.
+            hops = freed_launch(hops, self.catalogue, self.rules.launch_speed_max_m_s)
         return CustomCandidates(
             parent[within],
             plans.target[within],

@@ -22,6 +22,8 @@ def legs_between(
     least_mass: float,
     departure_velocity: _Array | None = None,
     arrival_velocity: _Array | None = None,
+    vinf_dep: _Array | float = 0.0,
+    vinf_arr: _Array | float = 0.0,
 ) -> Legs:
     """Return n legs.
 
@@ -41,6 +43,8 @@ def legs_between(
         What has to be left at arrival: the legs' dry mass.
     departure_velocity, arrival_velocity : (n, 3) float64, m/s, optional
         Relative to the bodies left and reached; default: rest.
+    vinf_dep, vinf_arr : (n,) float64, m/s, or one for all
+        Largest excess velocities beyond these.
     """
     left = catalogue.states_at(row, t_mjd2000)
     reached = catalogue.states_at(target, t_mjd2000 + tof_days)
@@ -59,4 +63,6 @@ def legs_between(
         t_dep_mjd2000=t_mjd2000,
         dep_id=catalogue.ids[row],
         arr_id=catalogue.ids[target],
+        vinf_dep=vinf_dep,
+        vinf_arr=vinf_arr,
     )

@@ -1,12 +1,14 @@
-"""`FlyBy`: a body met at rest before is passed once more, fast."""
+"""`FlyBy`: bodies are passed with some speed: new ones, or those met at rest before."""
 
 from itertools import pairwise
 from typing import Self, final
 
 import msgspec
 import numpy as np
+from msgspec import UNSET, UnsetType
 
 from seqsearch.tours.checks import (
+    SPEED_TOLERANCE_M_S,
     TIME_TOLERANCE_DAYS,
     Check,
     FlownTour,
@@ -25,18 +27,25 @@ class FlyBy(
     tag_field="kind",
     tag="fly-by",
 ):
-    """The rule of fly-bys of bodies that were met at rest before.
+    """The rule of fly-bys: of bodies that were met at rest before, and as visits themselves.
 
     Parameters
     ----------
     speed_min_m_s : float
         Least speed relative to the body.
     times : int
-        How often each body may be passed; 0 for no fly-bys.
+        How often each body that was met before may be passed; 0 for no such fly-bys.
+    visit_max_m_s : float or None, optional
+        Largest speed with which a body may be visited, None for any; tours whose file says
+        nothing have to be at rest.
+    last_max_m_s : float or None, optional
+        The same for the last visit of the tour, where that differs.
     """
 
     speed_min_m_s: float
     times: int = 1
+    visit_max_m_s: float | UnsetType | None = UNSET
+    last_max_m_s: float | UnsetType | None = UNSET
 
     @classmethod
     def forbidden(cls) -> Self:
@@ -46,6 +55,7 @@ class FlyBy(
     def checks(self, flown: FlownTour, /) -> list[Check]:
         """Return the checks of which bodies are passed, how fast, and without a stay after it."""
         astray = self._astray(flown.legs)
+        met_before = self.visit_max_m_s is UNSET and self.last_max_m_s is UNSET
         wait = largest(
             abs(following.t_dep_mjd2000 - leg.t_arr_mjd2000)
             for leg, following in pairwise(flown.legs)
@@ -58,10 +68,10 @@ class FlyBy(
         )
         return [
             Check(
-                "fly-bys of bodies met before, once each",
+                "fly-bys of bodies met before, once each" if met_before else "fly-bys",
                 not astray,
                 str(astray) if astray else "all",
-                "all" if self.times else "no fly-bys",
+                ("all" if self.times else "no fly-bys") if met_before else "of bodies to visit",
             ),
             Check(
                 "no stay after a fly-by",
@@ -75,15 +85,46 @@ class FlyBy(
                 f"slowest {slowest:.3f} m/s",
                 f"at least {self.speed_min_m_s:g} m/s",
             ),
+            *self._speeds_of_visits(flown.legs),
         ]
 
+    def visit_bound(self, *, last: bool) -> float:
+        """Return m/s, the largest speed of the last visit, or of those before; inf for any."""
+        bound = self.visit_max_m_s
+        if last and self.last_max_m_s is not UNSET:
+            bound = self.last_max_m_s
+        if bound is UNSET:
+            return 0.0
+        return np.inf if bound is None else float(bound)
+
+    def _speeds_of_visits(self, legs: tuple[TourLeg, ...]) -> list[Check]:
+        """Return a check of the speeds of visits, where they have a bound but need not rest."""
+        checks = []
+        for last, name in ((False, "speed of visits"), (True, "speed at the last arrival")):
+            bound = self.visit_bound(last=last)
+            if 0.0 < bound < np.inf:
+                fastest = largest(
+                    float(np.linalg.norm(leg.arr_velocity_m_s))
+                    for leg in (legs[-1:] if last else legs[:-1])
+                )
+                checks.append(
+                    Check(
+                        name,
+                        fastest <= bound + SPEED_TOLERANCE_M_S,
+                        f"fastest {fastest:.6f} m/s",
+                        f"{bound:g} m/s",
+                    )
+                )
+        return checks
+
     def _astray(self, legs: tuple[TourLeg, ...]) -> list[int]:
-        """Return the bodies that are passed too often, or before they were met at rest."""
+        """Return bodies that are passed too often, or that had to be met at rest before."""
         astray: list[int] = []
         met: set[int] = set()
         passed: list[int] = []
         for leg in legs:
-            if not leg.is_fly_by:
+            visit = leg.to_id not in met and self.visit_bound(last=leg is legs[-1]) > 0.0
+            if not leg.is_fly_by or visit:
                 met.add(leg.to_id)
                 continue
             if leg.to_id not in met or passed.count(leg.to_id) >= self.times:

@@ -16,7 +16,7 @@ from seqsearch.tours.dates import date_of
 from seqsearch.tours.export.arcs import Arc, mission_arcs, words
 from seqsearch.tours.export.as_flown import as_flown
 from seqsearch.tours.export.protocol import Flight
-from seqsearch.tours.records import TourBody
+from seqsearch.tours.records import TourBody, Vector
 
 FORMAT: Final = "seqsearch-flight-1"
 """Name and version of the layout."""
@@ -84,12 +84,18 @@ def document(flight: Flight) -> dict[str, Any]:
                 "m_final_kg": leg.m_final_kg,
                 "margin": leg.margin,
                 "fly_by": leg.is_fly_by,
+                "departure_excess_km_s": _km_s(leg.dep_velocity_m_s),
+                "arrival_excess_km_s": _km_s(leg.arr_velocity_m_s),
             }
             for number, leg in enumerate(tour.legs, 1)
         ],
         "columns": list(COLUMNS),
         "arcs": [_arc(arc) for arc in arcs],
     }
+
+
+def _km_s(velocity_m_s: Vector) -> list[float]:
+    return [component / 1e3 for component in velocity_m_s]
 
 
 def _body(body: TourBody) -> dict[str, Any]:

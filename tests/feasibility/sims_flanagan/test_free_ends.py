@@ -281,6 +281,33 @@ def test_a_leg_that_coasts_to_its_target_after_a_whole_turn_is_found():
     assert (max_initial_mass(legs) > 3000.0).all()
 
 
+def test_a_spacecraft_that_passes_its_target_on_a_hyperbola_burns_less_than_at_full_thrust():
+    circle = np.sqrt(MU_SUN / AU)
+    legs = Legs(
+        [AU, 0.0, 0.0, 0.0, circle, 0.0],
+        [
+            [3.0 * AU * np.cos(angle), 3.0 * AU * np.sin(angle), 0.05 * AU, -8e3, 12e3, 0.0]
+            for angle in (0.6, 0.9, 1.2)
+        ],
+        tof_days=150.0,
+        m0=1500.0,
+        thrust=0.3,
+        isp=4000.0,
+        m_dry=0.0,
+        vinf_dep=3000.0,
+        vinf_arr=np.inf,
+    )
+    heaviest = fast_max_initial_mass(legs)
+    lighter = legs.with_m0(np.maximum(0.7 * heaviest.m0, 100.0 * legs.thrust))
+    flown = fast_min_propellant(lighter, guess=heaviest)
+    assert flown.converged.all()
+    speed = np.linalg.norm(legs.rv_arr[:, 3:] + flown.arr_excess, axis=1)
+    radius = np.linalg.norm(legs.rv_arr[:, :3], axis=1)
+    assert (speed > np.sqrt(2.0 * MU_SUN / radius)).any()
+    at_full_thrust = 1.0 - heaviest.m_final / heaviest.m0
+    assert (1.0 - flown.m_final / flown.m0 < 0.97 * at_full_thrust).all()
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "ends", [(3000.0, 0.0), (0.0, 3000.0), (1000.0, 1000.0), (0.0, np.inf), (2000.0, np.inf)]

@@ -22,9 +22,11 @@ with event.install_recorder("numba:compile") as before:
 belt = synthetic_main_belt(50, np.random.default_rng(1))
 tof = np.linspace(200.0, 900.0, 20)
 start, end = belt.states_at(np.arange(20), 8000.0), belt.states_at(np.arange(20, 40), 8000.0 + tof)
-legs = Legs(start, end, tof, 300.0, 0.5, 3000.0, 0.0)
+leg = (start, end, tof, 300.0, 0.5, 3000.0, 0.0)
 with event.install_recorder("numba:compile") as after:
-    optimise(legs.with_m0(max_initial_mass(legs) * 0.9 + 1e-3))
+    for ends in ((0.0, 0.0), (2000.0, 0.0), (0.0, np.inf)):
+        legs = Legs(*leg, vinf_dep=ends[0], vinf_arr=ends[1])
+        optimise(legs.with_m0(np.minimum(max_initial_mass(legs), 1e6) * 0.9 + 51.0))
 print(len(after.buffer))
 for _, each in before.buffer:
     kernel = each.data["dispatcher"]
@@ -51,15 +53,19 @@ def test_after_preparing_no_leg_compiles_anything(tmp_path):
     if usable_processors() > 1:
         names = {kernel.rpartition(".")[2] for kernel in kernels}
         assert "maximum_batch" in names
-        assert not {"polish", "minimise_one", "minimum_batch"} & names
+        assert "free_maximum_batch" in names
+        assert not {"polish", "minimise_one", "minimum_batch", "free_minimum_batch"} & names
 
 
 def test_what_the_other_process_compiles_is_what_the_solver_calls():
+    from feasibility.sims_flanagan.fast.free_kernels import free_maximum_batch
+    from feasibility.sims_flanagan.fast.free_propellant_kernels import free_minimum_batch
     from feasibility.sims_flanagan.fast.propellant_kernels import minimum_batch
 
     prepare.compile_second_half()
     prepare.compile_kernels()
-    assert len(minimum_batch.signatures) == 1
+    for batch in (minimum_batch, free_minimum_batch, free_maximum_batch):
+        assert len(batch.signatures) == 1
 
 
 def test_with_a_warm_cache_no_other_process_is_started(monkeypatch):

@@ -12,10 +12,12 @@ from feasibility.orbits import Catalogue
 from seqsearch import RendezvousProblem, SearchSettings, search, verify_tour
 from seqsearch.commands.cli import main
 from seqsearch.core.check_problem import check_problem
+from seqsearch.core.hops import Hops
 from seqsearch.core.nodes import Nodes
 from seqsearch.core.optimisation import solve_hops
 from seqsearch.core.problem import Problem
 from seqsearch.problems.gtoc2 import RULES, build
+from seqsearch.problems.gtoc2 import problem as gtoc2_problem
 from seqsearch.problems.gtoc2.delta_v import delta_v_to_go, transfer_delta_v
 from seqsearch.problems.gtoc2.group_sets import GroupSets
 from seqsearch.problems.gtoc2.plans import LEVELS
@@ -198,7 +200,9 @@ def test_a_body_of_a_group_that_was_visited_may_not_be_visited():
     assert problem.may_visit(nodes, target).tolist() == [[False, False, False, False, True, True]]
 
 
-def test_launches_keep_to_the_speed_and_beat_those_along_lambert_arcs(classifier):
+def test_launches_keep_to_the_speed_and_beat_those_along_lambert_arcs(classifier, monkeypatch):
+    # The directions as planned: the solver is free to find others.
+    monkeypatch.setattr(gtoc2_problem, "freed_launch", lambda hops, *_: hops)
     problem = toy_problem()
     nodes = problem.starts(SETTINGS.with_(starts=3), np.random.default_rng(4))
     parts = list(problem.candidates(nodes, SETTINGS, classifier, 1))
@@ -216,6 +220,25 @@ def test_launches_keep_to_the_speed_and_beat_those_along_lambert_arcs(classifier
     ours = np.concatenate([classifier.margin(leg) for leg in legs])
     assert (ours >= 0.98 * classifier.margin(along)).mean() > 0.9
     assert np.nanmedian(ours / classifier.margin(along)) > 1.05
+
+
+def test_the_solver_launches_at_least_as_well_as_planned(classifier, monkeypatch):
+    problem = toy_problem()
+    nodes = problem.starts(SETTINGS.with_(starts=3), np.random.default_rng(4))
+
+    def launches():
+        parts = problem.candidates(nodes, SETTINGS, classifier, 1)
+        return Hops.concatenate([part.hops for part in parts]).take(np.arange(12))
+
+    free = launches()
+    monkeypatch.setattr(gtoc2_problem, "freed_launch", lambda hops, *_: hops)
+    planned = launches()
+    assert (free.legs[0].vinf_dep < 3500.0).all()
+    assert (free.legs[0].vinf_dep > 3499.0).all()
+    assert not planned.legs[0].vinf_dep.any()
+    one, other = (solve_hops(hops, "fast") for hops in (free, planned))
+    assert (one.m_star[0] > 0.998 * other.m_star[0]).all()
+    assert np.median(one.m_star[0] / other.m_star[0]) > 1.0
 
 
 def _earth(problem, legs):

@@ -154,6 +154,39 @@ def test_no_body_is_passed_more_often_than_the_rule_says(visits, times):
     assert (ONCE in _failed(FlyBy(speed_min_m_s=1.0, times=times), *legs)) == (not good)
 
 
+VISITS = FlyBy(speed_min_m_s=0.0, times=0, visit_max_m_s=3000.0, last_max_m_s=0.0)
+ANY = FlyBy(speed_min_m_s=0.0, times=0, visit_max_m_s=None)
+LAST = FlyBy(speed_min_m_s=0.0, times=0, last_max_m_s=6000.0)
+
+
+@pytest.mark.parametrize(
+    ("rule", "legs", "failed"),
+    [
+        (VISITS, [(1, 2999.0), (2, 10.0), (3, 0.0)], set()),
+        (VISITS, [(1, 3001.0), (2, 0.0)], {"speed of visits"}),
+        (VISITS, [(1, 100.0), (2, 100.0)], {"fly-bys"}),
+        (VISITS, [(1, 100.0), (1, 100.0), (2, 0.0)], {"fly-bys"}),
+        (ANY, [(1, 1e5), (2, 0.0), (3, 1e5)], set()),
+        (ANY, [(1, 1e5), (2, 1e5), (1, 1e5)], {"fly-bys"}),
+        (LAST, [(1, 0.0), (2, 5999.0)], set()),
+        (LAST, [(1, 0.0), (2, 6001.0)], {"speed at the last arrival"}),
+        (LAST, [(1, 5.0), (2, 0.0)], {"fly-bys"}),
+        (LAST, [(1, 0.0), (2, float("nan"))], {"speed at the last arrival"}),
+    ],
+)
+def test_visits_may_be_as_fast_as_the_rule_says_and_each_body_is_passed_once(rule, legs, failed):
+    flown = [
+        _leg(body, t_dep=8000.0 + 10.0 * k, speed=speed) for k, (body, speed) in enumerate(legs)
+    ]
+    assert _failed(rule, *flown) - {"speed of fly-bys"} == failed
+    assert make_event(msgspec.json.decode(msgspec.json.encode(rule))) == rule
+
+
+def test_rules_from_before_fly_bys_as_visits_are_written_as_they_were():
+    rule = FlyBy(speed_min_m_s=400.0)
+    assert msgspec.to_builtins(rule) == {"kind": "fly-by", "speed_min_m_s": 400.0, "times": 1}
+
+
 def test_a_fly_by_whose_speed_is_unknown_is_not_passed():
     legs = (_leg(1), _leg(1, speed=500.0, t_dep=8010.0))
     nothing = Arrival(np.full(6, np.nan), np.zeros(6))
