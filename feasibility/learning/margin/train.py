@@ -200,12 +200,16 @@ def with_free_ends_of(artefact: Artefact, other: Artefact) -> Artefact:
 
 def _with_record(artefact: Artefact, other: Artefact) -> Artefact:
     """Return a model with the record of how the other one's nets for free ends were trained."""
-    parts = {}
-    for name in ("config", "metrics", "provenance"):
-        record: Mapping[str, Any] = getattr(other, name)
-        more = {"free_ends": record["free_ends"]} if "free_ends" in record else {}
-        parts[name] = {**getattr(artefact, name), **more}
-    return replace(artefact, **parts)
+
+    def joined(own: Mapping[str, Any], record: Mapping[str, Any]) -> dict[str, Any]:
+        return {**own, **({"free_ends": record["free_ends"]} if "free_ends" in record else {})}
+
+    return replace(
+        artefact,
+        config=joined(artefact.config, other.config),
+        metrics=joined(artefact.metrics, other.metrics),
+        provenance=joined(artefact.provenance, other.provenance),
+    )
 
 
 def _others(start: Artefact) -> dict[str, Any]:
