@@ -201,9 +201,8 @@ def with_free_ends_of(artefact: Artefact, other: Artefact) -> Artefact:
 def _with_record(artefact: Artefact, other: Artefact) -> Artefact:
     """Return a model with the record of how the other one's nets for free ends were trained."""
 
-    def joined(mine: Mapping[str, Any], theirs: Mapping[str, Any]) -> dict[str, Any]:
-        taken = {"free_ends": theirs["free_ends"]} if "free_ends" in theirs else {}
-        return {**mine, **taken}
+    def joined(own: Mapping[str, Any], record: Mapping[str, Any]) -> dict[str, Any]:
+        return {**own, **({"free_ends": record["free_ends"]} if "free_ends" in record else {})}
 
     return replace(
         artefact,

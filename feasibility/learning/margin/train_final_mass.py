@@ -190,9 +190,7 @@ class _Flown:
             rows = np.flatnonzero(np.isfinite(log_margin))
             legs, flown, X, log_margin = legs.take(rows), flown[rows], X[rows], log_margin[rows]
             used = np.log(legs.m0 / m_final[flown]) * legs.exhaust_velocity
-            inputs, base = view.mass_inputs(
-                legs, X, more[rows], log_margin, view.mass_sizes[-1]
-            )
+            inputs, base = view.mass_inputs(legs, X, more[rows], log_margin, view.mass_sizes[-1])
             share = base / legs.exhaust_velocity
             parts.append((inputs, np.log(used / base), share, margin_error[rows], pairs[flown]))
         return cls(*(np.concatenate(column) for column in zip(*parts, strict=True)))
