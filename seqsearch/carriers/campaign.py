@@ -218,10 +218,12 @@ class Campaign:
 
     def _keep(self, state: CampaignState, crew: Crew | None) -> None:
         """Put a crew among the best, one of each plan, if its mother ship can fly."""
-        if crew is None or carrier_of(self._context.screen, crew) is None:
+        if crew is None:
             return
         same = [k for k, other in enumerate(state.crews) if other.plan.same(crew.plan)]
         if same and state.crews[same[0]].worth() >= crew.worth():
+            return
+        if carrier_of(self._context.screen, crew) is None:
             return
         for k in same:
             del state.crews[k]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from feasibility.classifier.predictor import LegPredictor
-from feasibility.constants import YEAR_DAYS
+from feasibility.constants import AU, YEAR_DAYS
 from feasibility.orbits import Catalogue
 from feasibility.orbits.neighbours import orbital_metric
 from seqsearch.carriers.homing import Homecoming, Homing, HomingSettings
@@ -49,6 +49,9 @@ _CROWD_DAYS: Final = 150.0
 _CROWD_SPEED: Final = 2500.0
 _CROWD_STEP_DAYS: Final = 240.0
 """Metric, distance in m/s and step of the epochs at which neighbours are counted."""
+
+_SPARE_BODIES: Final = 3
+"""Bodies for which routes are looked for, for each that is wanted."""
 
 _ELEMENTS: Final = (3.0, 0.25, np.radians(10.0))
 """Largest a in AU, e and i of orbits that are looked at."""
@@ -121,10 +124,8 @@ class Screen:
     def crowded(self, count: int) -> _Index:
         """Return rows of bodies that she can get to, most neighbours first."""
         a, e, i = self.catalogue.elements[:, :3].T
-        limits = np.array(_ELEMENTS) * (1.495978707e11, 1.0, 1.0)
+        limits = np.array(_ELEMENTS) * (AU, 1.0, 1.0)
         rows = np.flatnonzero((a < limits[0]) & (e < limits[1]) & (i < limits[2]))
-        routes = self.routes(rows)
-        rows = np.unique(routes.row)
         first, last = self.rules.launch_mjd2000
         epochs = np.arange(first + YEAR_DAYS, last + 11 * YEAR_DAYS, _CROWD_STEP_DAYS)
         counts = np.zeros(len(rows))
@@ -132,7 +133,9 @@ class Screen:
             points = orbital_metric(self.catalogue.states(float(epoch)), _CROWD_DAYS)
             near = cKDTree(points).query_ball_point(points[rows], _CROWD_SPEED, return_length=True)
             counts += np.asarray(near, dtype=np.float64)
-        return rows[np.argsort(-counts, kind="stable")[:count]]
+        rows = rows[np.argsort(-counts, kind="stable")[: _SPARE_BODIES * count]]
+        within = np.isin(rows, self.routes(rows).row)
+        return rows[within][:count]
 
     def routes(self, rows: _Index) -> Routes:
         """Return direct routes to bodies, cheap enough to be moved to within the budget."""
