@@ -50,6 +50,9 @@ _CROWD_SPEED: Final = 2500.0
 _CROWD_STEP_DAYS: Final = 240.0
 """Metric, distance in m/s and step of the epochs at which neighbours are counted."""
 
+_MOST_SECONDS: Final = 30
+"""Second orbits that are rated for a plan."""
+
 _SPARE_BODIES: Final = 3
 """Bodies for which routes are looked for, for each that is wanted."""
 
@@ -165,16 +168,12 @@ class Screen:
 
     def rate(self, row: int, width: int, offset: float = 0.0) -> list[Plan]:
         """Return plans that keep to one orbit, one a window."""
-        plans = []
-        for window in self.windows(self.routes(np.array([row])), offset):
-            plan = Plan(row, row, float(window), 0.0)
-            tours = self.tours(plan, HomingSettings(width=width, results=1))
-            if tours:
-                plans.append(replace(plan, value=self._value(tours)))
-        return plans
+        windows = self.windows(self.routes(np.array([row])), offset)
+        plans = [self.valued(Plan(row, row, float(window), 0.0), width) for window in windows]
+        return [plan for plan in plans if plan.value > 0.0]
 
-    def seconds(self, plan: Plan, width: int) -> list[Plan]:
-        """Return plans with other second orbits that she can go on to."""
+    def continued(self, plan: Plan) -> list[Plan]:
+        """Return plans with the second orbits that she can go on to, cheapest first, unrated."""
         route = self.route(plan)
         if route is None:
             return []
@@ -184,13 +183,13 @@ class Screen:
             (plan.window_mjd2000 + SPREAD_DAYS, plan.window_mjd2000 + self.duration_days),
             later_budget(self.rules, route.delta_v),
         )
-        plans = []
-        for row in rows:
-            other = replace(plan, second=int(row))
-            tours = self.tours(other, HomingSettings(width=width, results=1))
-            if tours:
-                plans.append(replace(other, value=self._value(tours)))
-        return plans
+        return [replace(plan, second=int(row), value=0.0) for row in rows[:_MOST_SECONDS]]
+
+    def valued(self, plan: Plan, width: int) -> Plan:
+        """Return a plan with its value: that of its best predicted tour; 0 for none."""
+        tours = self.tours(plan, HomingSettings(width=width, results=1))
+        values = [tour.value(self.duration_days) for tour in tours]
+        return replace(plan, value=max(values, default=0.0))
 
     def tours(
         self,
@@ -206,9 +205,6 @@ class Screen:
         )
         closed = np.unique([plan.first, plan.second, *avoid])
         return self.homing.run(starts, plan.second, closed, settings)
-
-    def _value(self, tours: list[Homecoming]) -> float:
-        return max(tour.value(self.duration_days) for tour in tours)
 
     def route(self, plan: Plan) -> Route | None:
         """Return the cheapest way to the first orbit that is in time; None for none."""
