@@ -88,11 +88,18 @@ def refine_leg(
     Raises
     ------
     InputError
-        The arrival is not after the departure, or throttles have another shape.
+        The arrival is not after the departure, throttles have another shape, or a number is not
+        finite.
     """
     start = np.array(throttles, dtype=np.float64)
     if start.ndim != 2 or start.shape[1] != 3 or not len(start):
         raise InputError(f"throttles: got shape {start.shape}, expected (segments, 3)")
+    # Solvers give NaN for a leg that they cannot fly, with which no iteration would end.
+    if (
+        not np.isfinite(start).all()
+        or not np.isfinite(0.0 if impulses_m_s is None else impulses_m_s).all()
+    ):
+        raise InputError("throttles or impulses: a number that is not finite")
     if not leg.t_dep_mjd2000 < t_arr_mjd2000:
         raise InputError(
             f"arrival {t_arr_mjd2000:.6f}, expected after the departure {leg.t_dep_mjd2000:.6f}"

@@ -142,6 +142,10 @@ def test_input_that_cannot_be_used_is_refused():
     leg, throttles = leg_to_nearby(40.0, (0.0, 100.0, 0.0))
     with pytest.raises(InputError, match="throttles"):
         refine_leg(leg, T_DEP + 40.0, np.zeros(3))
+    with pytest.raises(InputError, match="not finite"):
+        refine_leg(leg, T_DEP + 40.0, np.full_like(throttles, np.nan))
+    with pytest.raises(InputError, match="not finite"):
+        refine_leg(leg, T_DEP + 40.0, throttles, impulses_m_s=np.full_like(throttles, np.inf))
     with pytest.raises(InputError, match="after the departure"):
         refine_leg(leg, T_DEP - 1.0, throttles)
     with pytest.raises(InputError, match="m0_kg"):
