@@ -175,13 +175,17 @@ class Campaign:
 
     def _pair(self, state: CampaignState) -> None:
         deadline = self._until(_SHARES[1])
+        screen = self._context.screen
         while state.joined < min(self._settings.pairs, len(state.rated)):
-            if deadline.passed():
-                return
-            chunk = state.rated[state.joined : state.joined + self._at_once]
-            for plans in self._all(_paired, [(plan, _NARROW) for plan in chunk]):
-                state.paired += plans
-            state.joined += len(chunk)
+            plan = state.rated[state.joined]
+            others = screen.continued(plan)
+            for first in range(0, len(others), self._at_once):
+                if deadline.passed():
+                    return
+                chunk = others[first : first + self._at_once]
+                rated = self._all(_valued, [(other, _NARROW) for other in chunk])
+                state.paired += [other for other in rated if other.value > 0.0]
+            state.joined += 1
             state.paired.sort(key=lambda plan: -plan.value)
             best = state.paired[0].value if state.paired else 0.0
             self._report(state, f"{state.joined} plans continued, best {best:.2f}")
@@ -218,10 +222,12 @@ class Campaign:
 
     def _keep(self, state: CampaignState, crew: Crew | None) -> None:
         """Put a crew among the best, one of each plan, if its mother ship can fly."""
-        if crew is None or carrier_of(self._context.screen, crew) is None:
+        if crew is None:
             return
         same = [k for k, other in enumerate(state.crews) if other.plan.same(crew.plan)]
         if same and state.crews[same[0]].worth() >= crew.worth():
+            return
+        if carrier_of(self._context.screen, crew) is None:
             return
         for k in same:
             del state.crews[k]
@@ -255,8 +261,8 @@ def _rated(context: _Context, row: int, width: int, offset: float) -> list[Plan]
     return context.screen.rate(row, width, offset)
 
 
-def _paired(context: _Context, plan: Plan, width: int) -> list[Plan]:
-    return context.screen.seconds(plan, width)
+def _valued(context: _Context, plan: Plan, width: int) -> Plan:
+    return context.screen.valued(plan, width)
 
 
 def _manned(context: _Context, plan: Plan, settings: HomingSettings) -> Crew | None:

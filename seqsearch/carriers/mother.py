@@ -119,7 +119,7 @@ def change_orbit(
     ]
     ways = [_arc(catalogue, first, second, begin + a * days, begin + b * days) for a, b in starts]
     order = np.argsort([way.delta_v for way in ways], kind="stable")
-    best = ways[order[0]]
+    best: Change = ways[int(order[0])]
     for k in order[:3]:
         found = minimize(
             lambda x: min(

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from feasibility.classifier.predictor import LegPredictor
-from feasibility.constants import YEAR_DAYS
+from feasibility.constants import AU, YEAR_DAYS
 from feasibility.orbits import Catalogue
 from feasibility.orbits.neighbours import orbital_metric
 from seqsearch.carriers.homing import Homecoming, Homing, HomingSettings
@@ -49,6 +49,12 @@ _CROWD_DAYS: Final = 150.0
 _CROWD_SPEED: Final = 2500.0
 _CROWD_STEP_DAYS: Final = 240.0
 """Metric, distance in m/s and step of the epochs at which neighbours are counted."""
+
+_MOST_SECONDS: Final = 30
+"""Second orbits that are rated for a plan."""
+
+_SPARE_BODIES: Final = 3
+"""Bodies for which routes are looked for, for each that is wanted."""
 
 _ELEMENTS: Final = (3.0, 0.25, np.radians(10.0))
 """Largest a in AU, e and i of orbits that are looked at."""
@@ -121,10 +127,8 @@ class Screen:
     def crowded(self, count: int) -> _Index:
         """Return rows of bodies that she can get to, most neighbours first."""
         a, e, i = self.catalogue.elements[:, :3].T
-        limits = np.array(_ELEMENTS) * (1.495978707e11, 1.0, 1.0)
+        limits = np.array(_ELEMENTS) * (AU, 1.0, 1.0)
         rows = np.flatnonzero((a < limits[0]) & (e < limits[1]) & (i < limits[2]))
-        routes = self.routes(rows)
-        rows = np.unique(routes.row)
         first, last = self.rules.launch_mjd2000
         epochs = np.arange(first + YEAR_DAYS, last + 11 * YEAR_DAYS, _CROWD_STEP_DAYS)
         counts = np.zeros(len(rows))
@@ -132,7 +136,9 @@ class Screen:
             points = orbital_metric(self.catalogue.states(float(epoch)), _CROWD_DAYS)
             near = cKDTree(points).query_ball_point(points[rows], _CROWD_SPEED, return_length=True)
             counts += np.asarray(near, dtype=np.float64)
-        return rows[np.argsort(-counts, kind="stable")[:count]]
+        rows = rows[np.argsort(-counts, kind="stable")[: _SPARE_BODIES * count]]
+        within = np.isin(rows, self.routes(rows).row)
+        return rows[within][:count]
 
     def routes(self, rows: _Index) -> Routes:
         """Return direct routes to bodies, cheap enough to be moved to within the budget."""
@@ -162,16 +168,12 @@ class Screen:
 
     def rate(self, row: int, width: int, offset: float = 0.0) -> list[Plan]:
         """Return plans that keep to one orbit, one a window."""
-        plans = []
-        for window in self.windows(self.routes(np.array([row])), offset):
-            plan = Plan(row, row, float(window), 0.0)
-            tours = self.tours(plan, HomingSettings(width=width, results=1))
-            if tours:
-                plans.append(replace(plan, value=self._value(tours)))
-        return plans
+        windows = self.windows(self.routes(np.array([row])), offset)
+        plans = [self.valued(Plan(row, row, float(window), 0.0), width) for window in windows]
+        return [plan for plan in plans if plan.value > 0.0]
 
-    def seconds(self, plan: Plan, width: int) -> list[Plan]:
-        """Return plans with other second orbits that she can go on to."""
+    def continued(self, plan: Plan) -> list[Plan]:
+        """Return plans with the second orbits that she can go on to, cheapest first, unrated."""
         route = self.route(plan)
         if route is None:
             return []
@@ -181,13 +183,13 @@ class Screen:
             (plan.window_mjd2000 + SPREAD_DAYS, plan.window_mjd2000 + self.duration_days),
             later_budget(self.rules, route.delta_v),
         )
-        plans = []
-        for row in rows:
-            other = replace(plan, second=int(row))
-            tours = self.tours(other, HomingSettings(width=width, results=1))
-            if tours:
-                plans.append(replace(other, value=self._value(tours)))
-        return plans
+        return [replace(plan, second=int(row), value=0.0) for row in rows[:_MOST_SECONDS]]
+
+    def valued(self, plan: Plan, width: int) -> Plan:
+        """Return a plan with its value: that of its best predicted tour; 0 for none."""
+        tours = self.tours(plan, HomingSettings(width=width, results=1))
+        values = [tour.value(self.duration_days) for tour in tours]
+        return replace(plan, value=max(values, default=0.0))
 
     def tours(
         self,
@@ -203,9 +205,6 @@ class Screen:
         )
         closed = np.unique([plan.first, plan.second, *avoid])
         return self.homing.run(starts, plan.second, closed, settings)
-
-    def _value(self, tours: list[Homecoming]) -> float:
-        return max(tour.value(self.duration_days) for tour in tours)
 
     def route(self, plan: Plan) -> Route | None:
         """Return the cheapest way to the first orbit that is in time; None for none."""
