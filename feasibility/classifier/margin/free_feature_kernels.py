@@ -245,7 +245,11 @@ def free_leg_features(
     m0, m1, _, _, _ = feature_work[1]
     a = to_frame(moved_dep, moved_arr, mu, m0, m1)
     floor = math.log(LEAST_ACCELERATION)
-    if not a > 0.0 or math.isnan(hint):
+    # A dual that vanishes everywhere has no direction.
+    whole = 0.0
+    for j in range(N_FEATURES):
+        whole += out[j]
+    if not a > 0.0 or math.isnan(hint) or not math.isfinite(whole):
         # There are no features of such orbits (the last one says so), but there is a hint.
         for j in range(N_FREE):
             out[j] = 0.0
