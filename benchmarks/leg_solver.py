@@ -8,7 +8,8 @@ arrival, general-ends) it prints
 - the share of legs whose m* is within 0.2 % of the reference's or larger, worse by
   more than 0.5 %, better by more than 0.2 %; where there are legs whose reference solution
   no spacecraft flies (`burns_nearly_everything`), once more without them;
-- the share of equal labels (m0 <= m*) among the legs that both solve;
+- the shares of equal labels (m0 <= m*) among all legs, where one that a solver does not solve counts
+  as too heavy, and among those that both solve;
 - the shares of legs that the fast solver cannot confirm, which would fall back, that the
   reference cannot, and that neither can;
 - label noise: the share of labels (m0 <= m*) that 20 more random starts flip;
@@ -117,7 +118,7 @@ def maximum_mass(name: str, legs: Legs) -> None:
     reference_start = (one_more - one_ms) / MORE_STARTS
     median = 1e3 * np.median(reference.seconds)
     solved = fast.converged & reference.converged
-    equal = ((fast.m0 >= legs.m0) == (reference.m0 >= legs.m0))[solved]
+    labels = (fast.m0 >= legs.m0) == (reference.m0 >= legs.m0)
     thrustless = np.isinf(reference.m0) | np.isinf(fast.m0)
     both = np.isinf(reference.m0) & np.isinf(fast.m0)
     known = reference.converged & ~thrustless
@@ -134,7 +135,8 @@ def maximum_mass(name: str, legs: Legs) -> None:
         f"(median {median:.1f})   ratio {reference_ms / fast_ms:6.0f}\n"
         f"  a start    fast {fast_start:8.2f} ms   reference {reference_start:8.1f} ms"
         f"   ratio {reference_start / fast_start:6.0f}\n"
-        f"  {agreement(fast, reference, known)}   labels equal {equal.mean():.4f}\n"
+        f"  {agreement(fast, reference, known)}   labels equal {labels.mean():.4f}, "
+        f"of legs that both solve {labels[solved].mean():.4f}\n"
         f"{without}"
         f"  no thrust needed: fast {np.isinf(fast.m0).mean():.4f}, "
         f"reference {np.isinf(reference.m0).mean():.4f}, both {both.mean():.4f}\n"

@@ -241,20 +241,19 @@ def free_leg_features(
         moved_dep[j], moved_arr[j] = rv_dep[j], rv_arr[j]
         moved_dep[3 + j] = rv_dep[3 + j] + found[j]
         moved_arr[3 + j] = rv_arr[3 + j] + found[3 + j]
+    floor = math.log(LEAST_ACCELERATION)
+    if best == BALLISTIC:
+        # Without thrust there is no dual, and what its features would say is rounding alone.
+        for j in range(N_FREE):
+            out[j] = 0.0
+        return floor
     hint = leg_features(moved_dep, moved_arr, tof_s, exhaust, mu, feature_work, out)
     m0, m1, _, _, _ = feature_work[1]
     a = to_frame(moved_dep, moved_arr, mu, m0, m1)
-    floor = math.log(LEAST_ACCELERATION)
-    # A dual that vanishes everywhere has no direction.
-    whole = 0.0
-    for j in range(N_FEATURES):
-        whole += out[j]
-    if not a > 0.0 or math.isnan(hint) or not math.isfinite(whole):
+    if not a > 0.0 or math.isnan(hint):
         # There are no features of such orbits (the last one says so), but there is a hint.
         for j in range(N_FREE):
             out[j] = 0.0
-        if best == BALLISTIC:
-            return floor
         total = ends_work[9][ROUNDS] * SEGMENTS
         return max(math.log(total / tof * mu / length / length), floor)
     show_within(out)
@@ -275,8 +274,6 @@ def free_leg_features(
     o = N_FEATURES + N_ENDS
     dual_features(tof, scaled, excess, axes, feature_work, out[o : o + N_DUALS])
     compared(best, hint + math.log(tof), ends_work, speed / unit, out[o + N_DUALS :])
-    if best == BALLISTIC:
-        return floor
     # The mean of both hints where they agree; else mostly the smaller one, as paths that do not
     # suit their leg cost more.
     free = math.log(max(ends_work[9][ROUNDS], 1e-12) * SEGMENTS * speed / unit / tof)
