@@ -8,8 +8,8 @@ arrival, general-ends) it prints
 - the share of legs whose m* is within 0.2 % of the reference's or larger, worse by
   more than 0.5 %, better by more than 0.2 %; where there are legs whose reference solution
   no spacecraft flies (`burns_nearly_everything`), once more without them;
-- the shares of equal labels (m0 <= m*) among all legs, where one that a solver does not solve counts
-  as too heavy, and among those that both solve;
+- the shares of equal labels (m0 <= m*) among all legs, where one that a solver does not solve
+  counts as too heavy, and among those that both solve;
 - the shares of legs that the fast solver cannot confirm, which would fall back, that the
   reference cannot, and that neither can;
 - label noise: the share of labels (m0 <= m*) that 20 more random starts flip;
