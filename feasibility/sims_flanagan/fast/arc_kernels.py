@@ -256,14 +256,14 @@ def restore(
 ) -> bool:
     """As `close` with the sensitivities at hand; gives up where it does not contract."""
     if not has_free_ends(n, w):
-        return _contract(x0, dv, n, target, tolerance, False, w)
+        return _contract(x0, dv, n, target, tolerance, bool(False), w)
     # An end that reaches its bound on the way spoils the contraction, once.
     for _ in range(_END_ATTEMPTS):
         look_at_ends(dv, n, w)
         correction_matrix(w.b[0], n, w.m[M_ONE], w)
         if not cholesky(w.m[M_ONE], w.m[M_TWO]):
             return False
-        if _contract(x0, dv, n, target, tolerance, True, w):
+        if _contract(x0, dv, n, target, tolerance, bool(True), w):
             return True
     return False
 
