@@ -19,7 +19,13 @@ from feasibility.sims_flanagan.fast.dual_kernels import z_of_impulses
 from feasibility.sims_flanagan.fast.element_kernels import to_elements, wrap
 from feasibility.sims_flanagan.fast.frame_kernels import scale_leg, write_throttles
 from feasibility.sims_flanagan.fast.lifted_kernels import draw_path
-from feasibility.sims_flanagan.fast.maximum_kernels import bend, lay_hop, pursue, turns_of
+from feasibility.sims_flanagan.fast.maximum_kernels import (
+    bend,
+    lay_hop,
+    pursue,
+    spent,
+    turns_of,
+)
 from feasibility.sims_flanagan.fast.newton_kernels import polish
 from feasibility.sims_flanagan.fast.workspace_kernels import (
     BEST,
@@ -72,6 +78,7 @@ _SAME = 1e-3
 _AGREEMENT = 5
 _WINDING = 0.5
 _HOPS = 8
+_DEEP = 1.0
 _TURN = 2.0 * math.pi
 _SHORT = math.pi
 _MET = 1e-9
@@ -409,17 +416,20 @@ def _best_free_arc(
     agreed = 0
     travel = _travel(w)
     long = travel > _SHORT
+    lost = False
     needed = _AGREEMENT + int(_WINDING * max(travel - _TURN, 0.0))
     n_bent = bent.shape[0]
-    n_hops = _HOPS if long else 0
+    n_hops = int(_HOPS)
     spare = int(_SPARE)
     for attempt in range(N_STARTS + n_bent + n_hops + shapes.shape[0]):
         k = attempt - N_STARTS
         hop = k - n_bent
-        if hop < n_hops and agreed >= needed:
-            continue
-        # Bent paths are for long legs, and for those that nothing else has closed.
-        if 0 <= k < n_bent and not long and best < np.inf:
+        # Bent paths are for long legs, for those that burn most of their mass, and for those
+        # that nothing else has closed.
+        if k == 0:
+            lost = not best < np.inf
+        thorough = long or lost or (best < np.inf and spent(n, c, w) > _DEEP)
+        if hop < n_hops and (agreed >= needed or (k >= 0 and not thorough)):
             continue
         if k < 0:
             s = _leading(w)
@@ -439,7 +449,7 @@ def _best_free_arc(
             if _lay(s, turns[like], x0, x1, ends[like, 0], ends[like, 1], shape, tof, n, w):
                 sweeps = int(_FIRST_SWEEPS + _GENTLE)
                 bend(s, sweeps, int(_GENTLE), c, n, n_forward, best, w)
-        z = pursue(s, x0, c, n, n_forward, best, long, w)
+        z = pursue(s, x0, c, n, n_forward, best, thorough, w)
         if k < 0 and z < np.inf:
             w.p[TURN_Z, s] = z
         if z < best:
