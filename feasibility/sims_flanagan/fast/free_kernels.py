@@ -78,7 +78,11 @@ _SAME = 1e-3
 _AGREEMENT = 5
 _WINDING = 0.5
 _HOPS = 8
+# Impulses together, in exhaust velocities, beyond which starts hardly agree: short legs take bent
+# paths too, and those that need much take more than the first few of them.
 _DEEP = 1.0
+_ROUGH = 0.7
+_FEW = 16
 _TURN = 2.0 * math.pi
 _SHORT = math.pi
 _MET = 1e-9
@@ -425,11 +429,14 @@ def _best_free_arc(
         k = attempt - N_STARTS
         hop = k - n_bent
         # Bent paths are for long legs, for those that burn most of their mass, and for those
-        # that nothing else has closed.
+        # that nothing else has closed; most of them for the latter two alone.
         if k == 0:
             lost = not best < np.inf
-        thorough = long or lost or (best < np.inf and spent(n, c, w) > _DEEP)
+        burnt = spent(n, c, w) if best < np.inf else 0.0
+        thorough = long or lost or burnt > _DEEP
         if hop < n_hops and (agreed >= needed or (k >= 0 and not thorough)):
+            continue
+        if _FEW <= k < n_bent and best < np.inf and burnt < _ROUGH:
             continue
         if k < 0:
             s = _leading(w)
@@ -438,12 +445,12 @@ def _best_free_arc(
                 continue
         elif 0 <= hop < n_hops:
             s = spare
-            start = N_STARTS + bent.shape[0] + 1
+            start = N_STARTS + int(_FEW) + 1
             if not (best < np.inf and lay_hop(s, x0, bent[1 + hop], n, best, w)):
                 continue
         else:
             s = spare
-            start = N_STARTS + min(k, bent.shape[0])
+            start = N_STARTS + (k if k < _FEW else int(_FEW) + (2 if k < n_bent else 0))
             shape = bent[k] if hop < 0 else shapes[hop - n_hops]
             like = _likely(k, best, w)
             if _lay(s, turns[like], x0, x1, ends[like, 0], ends[like, 1], shape, tof, n, w):
@@ -499,7 +506,8 @@ def free_maximum_batch(
     winner : (legs,) int64
         Receives the start that won: for 0 to 4 the number of turns between the bodies' orbits,
         for 6 to 10 between those of the cut Lambert arc, then Lambert's arcs, along the bodies'
-        orbits, bent paths, random ones, disturbed ones; `BALLISTIC` without thrust.
+        orbits, 16 bent paths, random ones, disturbed ones, further bent paths; `BALLISTIC`
+        without thrust.
     excess : (legs, 2, 3) float64
         Receives the velocities relative to the bodies at departure and arrival.
     """
