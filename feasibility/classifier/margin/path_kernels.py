@@ -30,7 +30,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.runtime.jit import inner_kernel, kernel, summing_kernel
+from feasibility.classifier.margin.lanes.math_kernels import inverse_cube_root
+from feasibility.runtime.jit import inner_kernel, kernel, lane_function, summing_kernel
 
 _Array = NDArray[np.float64]
 PathWork = tuple[_Array, _Array, _Array, _Array, _Array, _Array, _Array, _Array, _Array]
@@ -49,7 +50,7 @@ _LEAST_MOTION = 0.15
 _LARGEST_ECCENTRICITY2 = 0.9**2
 
 
-@kernel
+@lane_function
 def sine_cosine(x: float) -> tuple[float, float]:
     """Return sine and cosine to 1e-13, in arithmetic alone, so that a loop becomes vectors.
 
@@ -97,7 +98,7 @@ def impulse_effects(path: _Array, nodes: int, rows: _Array, anomaly: _Array) -> 
         if not (path[i] > _LEAST_MOTION and ex * ex + ey * ey < _LARGEST_ECCENTRICITY2):
             return False
     for i in range(nodes):
-        anomaly[N_NODES + i] = 1.0 / np.cbrt(path[i])
+        anomaly[N_NODES + i] = inverse_cube_root(path[i])
     # Kepler's equation l = F - ex sin F + ey cos F; the derivatives vanish nowhere (e < 1).
     for i in range(nodes):
         ex, ey, longitude = path[N_NODES + i], path[2 * N_NODES + i], path[5 * N_NODES + i]
