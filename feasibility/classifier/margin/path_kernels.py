@@ -93,25 +93,25 @@ def impulse_effects(path: _Array, nodes: int, rows: _Array, anomaly: _Array) -> 
     anomaly : (6 N_NODES,) float64
         First the time that remains to arrival, the rest is scratch.
     """
-    for i in range(nodes):
+    for i in range(min(nodes, N_NODES)):
         ex, ey = path[N_NODES + i], path[2 * N_NODES + i]
         if not (path[i] > _LEAST_MOTION and ex * ex + ey * ey < _LARGEST_ECCENTRICITY2):
             return False
-    for i in range(nodes):
+    for i in range(min(nodes, N_NODES)):
         anomaly[N_NODES + i] = inverse_cube_root(path[i])
     # Kepler's equation l = F - ex sin F + ey cos F; the derivatives vanish nowhere (e < 1).
-    for i in range(nodes):
+    for i in range(min(nodes, N_NODES)):
         ex, ey, longitude = path[N_NODES + i], path[2 * N_NODES + i], path[5 * N_NODES + i]
         s, c = sine_cosine(longitude)
         # Halley's step from the mean longitude: mostly one more is enough.
         slope, curve = 1.0 - ex * c - ey * s, ex * s - ey * c
         anomaly[2 * N_NODES + i] = longitude + curve / (slope + 0.5 * curve * curve / slope)
-    for i in range(nodes):
+    for i in range(min(nodes, N_NODES)):
         s, c = sine_cosine(anomaly[2 * N_NODES + i])
         anomaly[3 * N_NODES + i] = s
         anomaly[4 * N_NODES + i] = c
     for _ in range(12):
-        for i in range(nodes):
+        for i in range(min(nodes, N_NODES)):
             ex, ey = path[N_NODES + i], path[2 * N_NODES + i]
             s, c = anomaly[3 * N_NODES + i], anomaly[4 * N_NODES + i]
             slope = 1.0 - ex * c - ey * s
@@ -121,16 +121,16 @@ def impulse_effects(path: _Array, nodes: int, rows: _Array, anomaly: _Array) -> 
             step = min(1.0, max(-1.0, gap / (slope - 0.5 * newton * curve)))
             anomaly[2 * N_NODES + i] -= step
             anomaly[5 * N_NODES + i] = step
-        for i in range(nodes):
+        for i in range(min(nodes, N_NODES)):
             s, c = sine_cosine(anomaly[2 * N_NODES + i])
             anomaly[3 * N_NODES + i] = s
             anomaly[4 * N_NODES + i] = c
         largest = 0.0
-        for i in range(nodes):
+        for i in range(min(nodes, N_NODES)):
             largest = max(largest, abs(anomaly[5 * N_NODES + i]))
         if largest < 1e-3:
             break
-    for i in range(nodes):
+    for i in range(min(nodes, N_NODES)):
         n, ex, ey = path[i], path[N_NODES + i], path[2 * N_NODES + i]
         h, k = path[3 * N_NODES + i], path[4 * N_NODES + i]
         remaining, root_a = anomaly[i], anomaly[N_NODES + i]
@@ -181,7 +181,7 @@ def first_path(
     """
     n0, n1 = x0[0], x1[0]
     bound = least * min(n0, n1)
-    for i in range(nodes):
+    for i in range(min(nodes, N_NODES)):
         s = (i + 0.5) / nodes
         path[i] = max(n0 + (n1 - n0) * s + 6.0 * excess / tof * s * (1.0 - s), bound)
         for j in range(1, 5):
@@ -194,7 +194,7 @@ def first_path(
 @inner_kernel
 def gauss_rows(path: _Array, tof: float, nodes: int, rows: _Array, anomaly: _Array) -> bool:
     """Write the rows of all nodes of a path; return False if it leaves the ellipses."""
-    for i in range(nodes):
+    for i in range(min(nodes, N_NODES)):
         anomaly[i] = tof * (1.0 - (i + 0.5) / nodes)
     return impulse_effects(path, nodes, rows, anomaly)
 
@@ -202,7 +202,7 @@ def gauss_rows(path: _Array, tof: float, nodes: int, rows: _Array, anomaly: _Arr
 @inner_kernel
 def duals(rows: _Array, p: _Array, nodes: int, g: _Array) -> None:
     """Write C_i^T p and its length, (4,) a node."""
-    for i in range(nodes):
+    for i in range(min(nodes, N_NODES)):
         g0 = (
             rows[i] * p[0]
             + rows[2 * N_NODES + i] * p[1]
@@ -241,7 +241,7 @@ def weighted_solve(
     """
     g00 = g01 = g02 = g05 = g11 = g12 = g13 = g14 = g15 = 0.0
     g22 = g23 = g24 = g25 = g33 = g34 = g35 = g44 = g45 = g55 = 0.0
-    for i in range(nodes):
+    for i in range(min(nodes, N_NODES)):
         w = weights[i]
         n0, n1 = w * rows[i], w * rows[N_NODES + i]
         a0, a1, a2 = (
@@ -339,7 +339,7 @@ def balanced_impulse(
     where nothing is left of the spacecraft, so there is one solution: Newton from below.
     """
     total = 0.0
-    for i in range(nodes):
+    for i in range(min(nodes, N_NODES)):
         total += g[3 * N_NODES + i]
     largest = (1.0 - 1e-3) * exhaust_velocity / nodes
     # With every mass the initial one z is too large, with every mass the final one too small.
@@ -348,7 +348,7 @@ def balanced_impulse(
     for _ in range(6):
         total = 0.0
         slope = 0.0
-        for i in range(nodes):
+        for i in range(min(nodes, N_NODES)):
             ratio = 1.0 / (1.0 - z * spent_segments(i, nodes) / exhaust_velocity)
             c[i] = ratio
             total += ratio * g[3 * N_NODES + i]
@@ -380,7 +380,7 @@ def smallest_impulse(
     the problem is singular. `weights` and `g` hold the impulses w_i g_i afterwards.
     """
     if z == 0.0:
-        for i in range(nodes):
+        for i in range(min(nodes, N_NODES)):
             weights[i] = 1.0
             c[i] = 1.0
     else:
@@ -405,10 +405,10 @@ def smallest_impulse(
 def reweight(g: _Array, c: _Array, nodes: int, weights: _Array) -> None:
     """Write weights c_i / |g_i|, bounded where a dual nearly vanishes."""
     mean = 0.0
-    for i in range(nodes):
+    for i in range(min(nodes, N_NODES)):
         mean += g[3 * N_NODES + i]
     least = 0.02 * mean / nodes
-    for i in range(nodes):
+    for i in range(min(nodes, N_NODES)):
         weights[i] = c[i] / max(g[3 * N_NODES + i], least)
 
 
@@ -420,7 +420,7 @@ def flown_path(
     dt = tof / nodes
     n, ex, ey, h, k = x0[0], x0[1], x0[2], x0[3], x0[4]
     longitude = x0[5] + 0.5 * n * dt
-    for i in range(nodes):
+    for i in range(min(nodes, N_NODES)):
         w = 0.5 * weights[i]
         r, t, o = w * g[i], w * g[N_NODES + i], w * g[2 * N_NODES + i]
         remaining = tof - (i + 0.5) * dt
