@@ -63,9 +63,7 @@ def lane_kernel(function: _F) -> _F:
 
 def lane_function(function: _F) -> _F:
     """Compile as `lane_kernel` what its loops call: it becomes a part of them."""
-    return _compiled(
-        function, fastmath={"contract"}, no_cpython_wrapper=True, forceinline=True
-    )
+    return _compiled(function, fastmath={"contract"}, no_cpython_wrapper=True, forceinline=True)
 
 
 @contextmanager

@@ -391,14 +391,10 @@ def refine(
         flown_path(x0, rows, weights, g, tof, N_NODES, flown)
         for i in range(N_NODES):
             for j in range(6):
-                path[j * STRIDE + i] += _DAMPING * (
-                    flown[j * STRIDE + i] - path[j * STRIDE + i]
-                )
+                path[j * STRIDE + i] += _DAMPING * (flown[j * STRIDE + i] - path[j * STRIDE + i])
         if not gauss_rows(path, tof, N_NODES, rows, anomaly):
             return True
-        value = smallest_impulse(
-            rows, d, ve, value, N_NODES, int(_NEXT_STEPS), p, weights, g, c
-        )
+        value = smallest_impulse(rows, d, ve, value, N_NODES, int(_NEXT_STEPS), p, weights, g, c)
         if not 0.0 < value < SATURATED:
             return True
         for j in range(k, _N_ROUNDS + 1):
@@ -612,7 +608,10 @@ def quick_batch(
     out: _Array,
     hint: _Array,
 ) -> None:
-    """Write features (n, N_QUICK) and log hints (n,) of n legs; see `quick_features`."""
+    """Write features (n, N_QUICK) and log hints (n,) of n legs, one after the other.
+
+    See `quick_features`; `lanes.rendezvous_kernels` does the same faster, and is compared with it.
+    """
     work = feature_workspace()
     for i in range(len(tof_s)):
         hint[i] = quick_features(rv_dep[i], rv_arr[i], tof_s[i], exhaust[i], mu, work, out[i])

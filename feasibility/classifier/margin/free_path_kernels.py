@@ -31,7 +31,6 @@ from numpy.typing import NDArray
 
 from feasibility.classifier.margin.feature_kernels import MAX_REVS, add_impulse
 from feasibility.classifier.margin.path_kernels import (
-    N_NODES,
     SATURATED,
     STRIDE,
     PathWork,
@@ -479,9 +478,7 @@ def pursue(
         elements[1, 5] += _TWO_PI * np.rint((longitude - elements[1, 5]) / _TWO_PI)
         for i in range(SEGMENTS):
             for j in range(6):
-                path[j * STRIDE + i] += _DAMPING * (
-                    flown[j * STRIDE + i] - path[j * STRIDE + i]
-                )
+                path[j * STRIDE + i] += _DAMPING * (flown[j * STRIDE + i] - path[j * STRIDE + i])
         if not lay_problem(tof, dep, arr, int(SEGMENTS), ends, elements, path_work):
             return z if k > _NEEDED_ROUNDS else SATURATED
         duals(rows, p, _NODES, g)

@@ -28,7 +28,6 @@ from feasibility.classifier.margin.free_path_kernels import (
     weigh_alike,
 )
 from feasibility.classifier.margin.path_kernels import (
-    N_NODES,
     SATURATED,
     STRIDE,
     PathWork,
@@ -143,9 +142,7 @@ def follow(
         elements[1, 5] += _TWO_PI * np.rint((longitude - elements[1, 5]) / _TWO_PI)
         for i in range(SEGMENTS):
             for j in range(6):
-                path[j * STRIDE + i] += _DAMPING * (
-                    flown[j * STRIDE + i] - path[j * STRIDE + i]
-                )
+                path[j * STRIDE + i] += _DAMPING * (flown[j * STRIDE + i] - path[j * STRIDE + i])
         if not lay_problem(tof, dep, arr, int(SEGMENTS), ends, elements, path_work):
             return SATURATED
         total = least_bounded_impulses(ve, push, dep, arr, int(_NEXT_STEPS), bound, path_work)

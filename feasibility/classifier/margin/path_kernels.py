@@ -64,10 +64,13 @@ def sine_cosine(x: float) -> tuple[float, float]:
     quarter = (x * _TWO_OVER_PI + _ROUND) - _ROUND
     r = (x - quarter * _HALF_PI_HEAD) - quarter * _HALF_PI_TAIL
     z = r * r
-    s = 1.0 / 362880.0 - z * (1.0 / 39916800.0 - z * (1.0 / 6227020800.0))
-    s = r * (1.0 - z * (1.0 / 6.0 - z * (1.0 / 120.0 - z * (1.0 / 5040.0 - z * s))))
-    c = 1.0 / 40320.0 - z * (1.0 / 3628800.0 - z * (1.0 / 479001600.0))
-    c = 1.0 - z * (0.5 - z * (1.0 / 24.0 - z * (1.0 / 720.0 - z * c)))
+    # Pairs of terms, not one after the other, as each waits for the one before.
+    z2 = z * z
+    s = (1.0 / 362880.0 - z * (1.0 / 39916800.0)) + z2 * (1.0 / 6227020800.0)
+    s = (1.0 - z * (1.0 / 6.0)) + z2 * ((1.0 / 120.0 - z * (1.0 / 5040.0)) + z2 * s)
+    s *= r
+    c = (1.0 / 40320.0 - z * (1.0 / 3628800.0)) + z2 * (1.0 / 479001600.0)
+    c = (1.0 - z * 0.5) + z2 * ((1.0 / 24.0 - z * (1.0 / 720.0)) + z2 * c)
     # Which quarter, from -2 to 2.
     place = quarter - 4.0 * ((0.25 * quarter + _ROUND) - _ROUND)
     odd = abs(place) == 1.0
@@ -85,7 +88,7 @@ def whole_vectors(nodes: int) -> int:
     return min((nodes + 7) >> 3, STRIDE >> 3) << 3
 
 
-@kernel
+@summing_kernel
 def impulse_effects(path: _Array, nodes: int, rows: _Array, anomaly: _Array) -> bool:
     """Write the 13 entries of C that are not zero, for each node; return False off the ellipses.
 
@@ -245,9 +248,7 @@ def duals(rows: _Array, p: _Array, nodes: int, g: _Array) -> None:
 
 
 @summing_kernel
-def weighted_solve(
-    rows: _Array, weights: _Array, d: _Array, nodes: int, p: _Array
-) -> bool:
+def weighted_solve(rows: _Array, weights: _Array, d: _Array, nodes: int, p: _Array) -> bool:
     """Write p with (sum_i w_i C_i C_i^T) p = d; return False if the matrix is singular."""
     g00 = g01 = g02 = g05 = g11 = g12 = g13 = g14 = g15 = 0.0
     g22 = g23 = g24 = g25 = g33 = g34 = g35 = g44 = g45 = g55 = 0.0
@@ -280,15 +281,11 @@ def weighted_solve(
         g12 += a0 * rows[5 * STRIDE + i] + a1 * rows[6 * STRIDE + i] + a2 * rows[7 * STRIDE + i]
         g13 += a2 * rows[8 * STRIDE + i]
         g14 += a2 * rows[9 * STRIDE + i]
-        g15 += (
-            a0 * rows[10 * STRIDE + i] + a1 * rows[11 * STRIDE + i] + a2 * rows[12 * STRIDE + i]
-        )
+        g15 += a0 * rows[10 * STRIDE + i] + a1 * rows[11 * STRIDE + i] + a2 * rows[12 * STRIDE + i]
         g22 += b0 * rows[5 * STRIDE + i] + b1 * rows[6 * STRIDE + i] + b2 * rows[7 * STRIDE + i]
         g23 += b2 * rows[8 * STRIDE + i]
         g24 += b2 * rows[9 * STRIDE + i]
-        g25 += (
-            b0 * rows[10 * STRIDE + i] + b1 * rows[11 * STRIDE + i] + b2 * rows[12 * STRIDE + i]
-        )
+        g25 += b0 * rows[10 * STRIDE + i] + b1 * rows[11 * STRIDE + i] + b2 * rows[12 * STRIDE + i]
         g33 += h2 * rows[8 * STRIDE + i]
         g34 += h2 * rows[9 * STRIDE + i]
         g35 += h2 * rows[12 * STRIDE + i]
@@ -353,6 +350,12 @@ def spent_segments(i: int, nodes: int) -> int:
     return i if 2 * i < nodes else i + 1
 
 
+@lane_function
+def spent_before(i: int, nodes: int) -> float:
+    """Return `spent_segments`, and of nodes that fill a vector no more than of the last one."""
+    return min(float(i) + (0.0 if 2 * i < nodes else 1.0), float(nodes))
+
+
 @summing_kernel
 def balanced_impulse(
     value: float, g: _Array, exhaust_velocity: float, nodes: int, c: _Array
@@ -363,10 +366,12 @@ def balanced_impulse(
     segment's propellant. The left side grows without bound as z approaches v_e / nodes,
     where nothing is left of the spacecraft, so there is one solution, by Newton's method.
     """
+    padded = whole_vectors(nodes)
     total, late = 0.0, 0.0
-    for i in range(min(nodes, STRIDE)):
-        total += g[3 * STRIDE + i]
-        late += spent_segments(i, nodes) * g[3 * STRIDE + i]
+    for i in range(padded):
+        dual = g[3 * STRIDE + i] if i < nodes else 0.0
+        total += dual
+        late += spent_before(i, nodes) * dual
     largest = (1.0 - 1e-3) * exhaust_velocity / nodes
     # As if all propellant were spent at once, at the mean time: nearly right, and a bit too much.
     # As if at once at the start it is too little, from where Newton never fails.
@@ -377,13 +382,15 @@ def balanced_impulse(
     for _ in range(6):
         total = 0.0
         slope = 0.0
-        for i in range(min(nodes, STRIDE)):
-            ratio = 1.0 / (1.0 - z * spent_segments(i, nodes) / exhaust_velocity)
+        used = z / exhaust_velocity
+        for i in range(padded):
+            dual = g[3 * STRIDE + i] if i < nodes else 0.0
+            ratio = 1.0 / (1.0 - used * spent_before(i, nodes))
             c[i] = ratio
-            total += ratio * g[3 * STRIDE + i]
-            slope += ratio * ratio * g[3 * STRIDE + i]
+            total += ratio * dual
+            slope += ratio * ratio * dual
         gap = value - z * total
-        if abs(gap) <= 1e-9 * value or z >= largest:
+        if abs(gap) <= 1e-6 * value or z >= largest:
             break
         z = min(z + gap / slope, largest)
     return z

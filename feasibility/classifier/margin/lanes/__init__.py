@@ -1,1 +1,1 @@
-"""Quick features of eight legs at a time: every step is a loop over lanes, one vector to the CPU."""
+"""The quick features, of eight legs at a time: a step is a loop over lanes, one vector to it."""

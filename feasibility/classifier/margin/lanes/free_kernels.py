@@ -32,6 +32,7 @@ from feasibility.classifier.margin.lanes.layout_kernels import (
     EXCESS0,
     EXCESS1,
     FEATURES,
+    FIRST,
     GUESS,
     IMPULSE,
     LANES,
@@ -40,8 +41,6 @@ from feasibility.classifier.margin.lanes.layout_kernels import (
     LOOSE,
     MIMA,
     MOST,
-    MOVED0,
-    MOVED1,
     NODES,
     ODD,
     OVER,
@@ -51,6 +50,7 @@ from feasibility.classifier.margin.lanes.layout_kernels import (
     ROWS,
     S0,
     S1,
+    SCRATCH,
     SIZE,
     SPEED,
     TOF,
@@ -97,16 +97,16 @@ _LARGEST_LOG = 3.0
 def to_leg_frame(mu: float, W: _Array) -> None:
     """Turn the bodies' states into the frame and the units of the leg; bounds and times too."""
     b = BODY0
-    for l in range(LANES):
-        x, y, z = W[at(b, l)], W[at(b + 1, l)], W[at(b + 2, l)]
-        u, v, w = W[at(b + 3, l)], W[at(b + 4, l)], W[at(b + 5, l)]
-        p, q, s = W[at(b + 6, l)], W[at(b + 7, l)], W[at(b + 8, l)]
+    for lane in range(LANES):
+        x, y, z = W[at(b, lane)], W[at(b + 1, lane)], W[at(b + 2, lane)]
+        u, v, w = W[at(b + 3, lane)], W[at(b + 4, lane)], W[at(b + 5, lane)]
+        p, q, s = W[at(b + 6, lane)], W[at(b + 7, lane)], W[at(b + 8, lane)]
         r = math.sqrt(x * x + y * y + z * z)
         far = math.sqrt(p * p + q * q + s * s)
         hx, hy, hz = y * w - z * v, z * u - x * w, x * v - y * u
         h = math.sqrt(hx * hx + hy * hy + hz * hz)
         fine = (r > 0.0) & (far > 0.0) & (h > 0.0)
-        W[at(ODD, l)] = 0.0 if fine else 1.0
+        W[at(ODD, lane)] = 0.0 if fine else 1.0
         over, over_h = 1.0 / r, 1.0 / h
         x, y, z = x * over, y * over, z * over
         hx, hy, hz = hx * over_h, hy * over_h, hz * over_h
@@ -115,19 +115,19 @@ def to_leg_frame(mu: float, W: _Array) -> None:
         over_length = 1.0 / length
         speed = math.sqrt(mu * over_length)
         over_speed = 1.0 / speed
-        W[at(LENGTH, l)] = length
-        W[at(SPEED, l)] = speed
-        W[at(TOF, l)] *= speed * over_length
-        W[at(VE, l)] *= over_speed
-        W[at(DEP, l)] *= over_speed
-        W[at(ARR, l)] *= over_speed
+        W[at(LENGTH, lane)] = length
+        W[at(SPEED, lane)] = speed
+        W[at(TOF, lane)] *= speed * over_length
+        W[at(VE, lane)] *= over_speed
+        W[at(DEP, lane)] *= over_speed
+        W[at(ARR, lane)] *= over_speed
         for part in range(4):
             unit = over_length if part % 2 == 0 else over_speed
             o = b + 3 * part
-            p, q, s = W[at(o, l)], W[at(o + 1, l)], W[at(o + 2, l)]
-            W[at(o, l)] = (p * x + q * y + s * z) * unit
-            W[at(o + 1, l)] = (p * tx + q * ty + s * tz) * unit
-            W[at(o + 2, l)] = (p * hx + q * hy + s * hz) * unit
+            p, q, s = W[at(o, lane)], W[at(o + 1, lane)], W[at(o + 2, lane)]
+            W[at(o, lane)] = (p * x + q * y + s * z) * unit
+            W[at(o + 1, lane)] = (p * tx + q * ty + s * tz) * unit
+            W[at(o + 2, lane)] = (p * hx + q * hy + s * hz) * unit
 
 
 @lane_kernel
@@ -140,44 +140,44 @@ def cut(W: _Array) -> None:
         v = V1 + 3 * end
         b = BODY0 + 6 * end + 3
         o = EXCESS0 + 3 * end
-        k = MOVED0 + 3 * end
+        k = SCRATCH + 3 * end
         sign = 1.0 if end == 0 else -1.0
-        for l in range(LANES):
-            x, y, z = W[at(v, l)] - W[at(b, l)], W[at(v + 1, l)] - W[at(b + 1, l)], 0.0
-            z = W[at(v + 2, l)] - W[at(b + 2, l)]
+        for lane in range(LANES):
+            x, y, z = W[at(v, lane)] - W[at(b, lane)], W[at(v + 1, lane)] - W[at(b + 1, lane)], 0.0
+            z = W[at(v + 2, lane)] - W[at(b + 2, lane)]
             size = math.sqrt(x * x + y * y + z * z)
-            bound = W[at(DEP + end, l)]
+            bound = W[at(DEP + end, lane)]
             within = size <= bound
             share = 1.0 if within else bound / size
-            W[at(o, l)] = x * share
-            W[at(o + 1, l)] = y * share
-            W[at(o + 2, l)] = z * share
+            W[at(o, lane)] = x * share
+            W[at(o + 1, lane)] = y * share
+            W[at(o + 2, lane)] = z * share
             rest = sign * (1.0 - share)
-            W[at(k, l)] = x * rest
-            W[at(k + 1, l)] = y * rest
-            W[at(k + 2, l)] = z * rest
+            W[at(k, lane)] = x * rest
+            W[at(k + 1, lane)] = y * rest
+            W[at(k + 2, lane)] = z * rest
             left = 0.0 if within else size - bound
-            W[at(OVER, l)] = left if end == 0 else W[at(OVER, l)] + left
-    mima(MOVED0, MOVED0 + 3, MIMA, W)
+            W[at(OVER, lane)] = left if end == 0 else W[at(OVER, lane)] + left
+    mima(SCRATCH, SCRATCH + 3, MIMA, W)
 
 
 @lane_kernel
-def touching(end: int, l: int, W: _Array) -> None:
+def touching(end: int, lane: int, W: _Array) -> None:
     """Write the excess of an orbit with an apsis at one end, and the other as far as the other."""
     own, other = BODY0 + 6 * end, BODY1 - 6 * end
     o = EXCESS0 + 3 * end
-    x, y, z = W[at(own, l)], W[at(own + 1, l)], W[at(own + 2, l)]
-    p, q, s = W[at(other, l)], W[at(other + 1, l)], W[at(other + 2, l)]
-    u, v, w = W[at(other + 3, l)], W[at(other + 4, l)], W[at(other + 5, l)]
+    x, y, z = W[at(own, lane)], W[at(own + 1, lane)], W[at(own + 2, lane)]
+    p, q, s = W[at(other, lane)], W[at(other + 1, lane)], W[at(other + 2, lane)]
+    u, v, w = W[at(other + 3, lane)], W[at(other + 4, lane)], W[at(other + 5, lane)]
     r = math.sqrt(x * x + y * y + z * z)
     far = math.sqrt(p * p + q * q + s * s)
     hx, hy, hz = q * w - s * v, s * u - p * w, p * v - q * u
     tx, ty, tz = hy * z - hz * y, hz * x - hx * z, hx * y - hy * x
     t = math.sqrt(tx * tx + ty * ty + tz * tz)
     speed = math.sqrt(2.0 / r - 2.0 / (r + far)) / max(t, 1e-12)
-    W[at(o, l)] = tx * speed - W[at(own + 3, l)]
-    W[at(o + 1, l)] = ty * speed - W[at(own + 4, l)]
-    W[at(o + 2, l)] = tz * speed - W[at(own + 5, l)]
+    W[at(o, lane)] = tx * speed - W[at(own + 3, lane)]
+    W[at(o + 1, lane)] = ty * speed - W[at(own + 4, lane)]
+    W[at(o + 2, lane)] = tz * speed - W[at(own + 5, lane)]
 
 
 @lane_kernel
@@ -186,45 +186,45 @@ def begin(W: _Array) -> None:
 
     Those of Lambert's arc, or the bodies' own where that asks for too much.
     """
-    for l in range(LANES):
-        over = W[at(OVER, l)]
-        W[at(GUESS, l)] = min(over, _LARGE) / NODES
-        W[at(ODD, l)] = W[at(ODD, l)] if over > 0.0 else 1.0
+    for lane in range(LANES):
+        over = W[at(OVER, lane)]
+        W[at(GUESS, lane)] = min(over, _LARGE) / NODES
+        W[at(ODD, lane)] = W[at(ODD, lane)] if over > 0.0 else 1.0
         if over > _LARGE:
             for j in range(6):
-                W[at(EXCESS0 + j, l)] = 0.0
+                W[at(EXCESS0 + j, lane)] = 0.0
             for end in range(2):
-                if W[at(DEP + end, l)] == np.inf:
-                    touching(end, l, W)
+                if W[at(DEP + end, lane)] == np.inf:
+                    touching(end, lane, W)
     for j in range(3):
-        for l in range(LANES):
-            W[at(S0 + j, l)] = W[at(BODY0 + j, l)]
-            W[at(S1 + j, l)] = W[at(BODY1 + j, l)]
-            W[at(S0 + 3 + j, l)] = W[at(BODY0 + 3 + j, l)] + W[at(EXCESS0 + j, l)]
-            W[at(S1 + 3 + j, l)] = W[at(BODY1 + 3 + j, l)] + W[at(EXCESS1 + j, l)]
+        for lane in range(LANES):
+            W[at(S0 + j, lane)] = W[at(BODY0 + j, lane)]
+            W[at(S1 + j, lane)] = W[at(BODY1 + j, lane)]
+            W[at(S0 + 3 + j, lane)] = W[at(BODY0 + 3 + j, lane)] + W[at(EXCESS0 + j, lane)]
+            W[at(S1 + 3 + j, lane)] = W[at(BODY1 + 3 + j, lane)] + W[at(EXCESS1 + j, lane)]
 
 
 @lane_kernel
 def local_axes(end: int, W: _Array) -> None:
     """Write the radial, transverse and normal directions at a state, S0 or S1, as AXES."""
     s = S0 + 6 * end
-    for l in range(LANES):
-        x, y, z = W[at(s, l)], W[at(s + 1, l)], W[at(s + 2, l)]
-        u, v, w = W[at(s + 3, l)], W[at(s + 4, l)], W[at(s + 5, l)]
+    for lane in range(LANES):
+        x, y, z = W[at(s, lane)], W[at(s + 1, lane)], W[at(s + 2, lane)]
+        u, v, w = W[at(s + 3, lane)], W[at(s + 4, lane)], W[at(s + 5, lane)]
         over = 1.0 / math.sqrt(x * x + y * y + z * z)
         hx, hy, hz = y * w - z * v, z * u - x * w, x * v - y * u
         over_h = 1.0 / math.sqrt(hx * hx + hy * hy + hz * hz)
         x, y, z = x * over, y * over, z * over
         hx, hy, hz = hx * over_h, hy * over_h, hz * over_h
-        W[at(AXES, l)] = x
-        W[at(AXES + 1, l)] = y
-        W[at(AXES + 2, l)] = z
-        W[at(AXES + 3, l)] = hy * z - hz * y
-        W[at(AXES + 4, l)] = hz * x - hx * z
-        W[at(AXES + 5, l)] = hx * y - hy * x
-        W[at(AXES + 6, l)] = hx
-        W[at(AXES + 7, l)] = hy
-        W[at(AXES + 8, l)] = hz
+        W[at(AXES, lane)] = x
+        W[at(AXES + 1, lane)] = y
+        W[at(AXES + 2, lane)] = z
+        W[at(AXES + 3, lane)] = hy * z - hz * y
+        W[at(AXES + 4, lane)] = hz * x - hx * z
+        W[at(AXES + 5, lane)] = hx * y - hy * x
+        W[at(AXES + 6, lane)] = hx
+        W[at(AXES + 7, lane)] = hy
+        W[at(AXES + 8, lane)] = hz
 
 
 @lane_kernel
@@ -234,56 +234,62 @@ def add_excess(end: int, W: _Array) -> None:
     sign = 1.0 if end == 0 else -1.0
     e = EXCESS0 + 3 * end
     o = ROWS + NODES + end
-    for l in range(LANES):
-        x, y, z = W[at(e, l)], W[at(e + 1, l)], W[at(e + 2, l)]
-        bounded = sign if W[at(DEP + end, l)] < np.inf else 0.0
+    for lane in range(LANES):
+        x, y, z = W[at(e, lane)], W[at(e + 1, lane)], W[at(e + 2, lane)]
+        bounded = sign if W[at(DEP + end, lane)] < np.inf else 0.0
         for k in range(3):
             a = AXES + 3 * k
-            part = x * W[at(a, l)] + y * W[at(a + 1, l)] + z * W[at(a + 2, l)]
-            W[at(MOVED0 + k, l)] = bounded * part
-    for l in range(LANES):
-        u, t, n = W[at(MOVED0, l)], W[at(MOVED0 + 1, l)], W[at(MOVED0 + 2, l)]
-        W[at(D, l)] += W[at(o, l)] * u + W[at(o + MOST, l)] * t
-        W[at(D + 1, l)] += (
-            W[at(o + 2 * MOST, l)] * u + W[at(o + 3 * MOST, l)] * t + W[at(o + 4 * MOST, l)] * n
+            part = x * W[at(a, lane)] + y * W[at(a + 1, lane)] + z * W[at(a + 2, lane)]
+            W[at(SCRATCH + k, lane)] = bounded * part
+    for lane in range(LANES):
+        u, t, n = W[at(SCRATCH, lane)], W[at(SCRATCH + 1, lane)], W[at(SCRATCH + 2, lane)]
+        W[at(D, lane)] += W[at(o, lane)] * u + W[at(o + MOST, lane)] * t
+        W[at(D + 1, lane)] += (
+            W[at(o + 2 * MOST, lane)] * u
+            + W[at(o + 3 * MOST, lane)] * t
+            + W[at(o + 4 * MOST, lane)] * n
         )
-        W[at(D + 2, l)] += (
-            W[at(o + 5 * MOST, l)] * u + W[at(o + 6 * MOST, l)] * t + W[at(o + 7 * MOST, l)] * n
+        W[at(D + 2, lane)] += (
+            W[at(o + 5 * MOST, lane)] * u
+            + W[at(o + 6 * MOST, lane)] * t
+            + W[at(o + 7 * MOST, lane)] * n
         )
-        W[at(D + 3, l)] += W[at(o + 8 * MOST, l)] * n
-        W[at(D + 4, l)] += W[at(o + 9 * MOST, l)] * n
-        W[at(D + 5, l)] += (
-            W[at(o + 10 * MOST, l)] * u + W[at(o + 11 * MOST, l)] * t + W[at(o + 12 * MOST, l)] * n
+        W[at(D + 3, lane)] += W[at(o + 8 * MOST, lane)] * n
+        W[at(D + 4, lane)] += W[at(o + 9 * MOST, lane)] * n
+        W[at(D + 5, lane)] += (
+            W[at(o + 10 * MOST, lane)] * u
+            + W[at(o + 11 * MOST, lane)] * t
+            + W[at(o + 12 * MOST, lane)] * n
         )
 
 
 @lane_kernel
 def weigh_alike(W: _Array) -> None:
     """Write the weights as if all duals were alike, for an impulse of a segment of GUESS."""
-    for l in range(LANES):
-        guess = W[at(GUESS, l)]
+    for lane in range(LANES):
+        guess = W[at(GUESS, lane)]
         for i in range(NODES):
-            W[at(WEIGHTS + i, l)] = guess
+            W[at(WEIGHTS + i, lane)] = guess
         for end in range(2):
-            W[at(WEIGHTS + NODES + end, l)] = min(W[at(DEP + end, l)], _STIFF * guess)
+            W[at(WEIGHTS + NODES + end, lane)] = min(W[at(DEP + end, lane)], _STIFF * guess)
 
 
 @lane_kernel
 def weigh(W: _Array) -> None:
     """Write the weights of the segments and of both ends, bounded where a dual nearly vanishes."""
     g = DUALS + 3 * MOST
-    for l in range(LANES):
+    for lane in range(LANES):
         mean = 0.0
         for i in range(NODES):
-            mean += W[at(g + i, l)]
+            mean += W[at(g + i, lane)]
         mean *= 1.0 / NODES
-        z, least = W[at(IMPULSE, l)], 0.02 * mean
+        z, least = W[at(IMPULSE, lane)], 0.02 * mean
         for i in range(NODES):
-            W[at(WEIGHTS + i, l)] = z * W[at(RATIO + i, l)] / max(W[at(g + i, l)], least)
+            W[at(WEIGHTS + i, lane)] = z * W[at(RATIO + i, lane)] / max(W[at(g + i, lane)], least)
         stiff = _STIFF * z / mean
         for end in range(2):
-            dual = max(W[at(g + NODES + end, l)], 1e-30)
-            W[at(WEIGHTS + NODES + end, l)] = min(W[at(DEP + end, l)] / dual, stiff)
+            dual = max(W[at(g + NODES + end, lane)], 1e-30)
+            W[at(WEIGHTS + NODES + end, lane)] = min(W[at(DEP + end, lane)] / dual, stiff)
 
 
 @lane_kernel
@@ -295,21 +301,21 @@ def bounded_impulse(W: _Array) -> None:
             weigh(W)
         weighted_solve(int(MOST), W)
         duals(int(MOST), W)
-        for l in range(LANES):
+        for lane in range(LANES):
             own = 0.0
             for i in range(NODES):
-                own += W[at(WEIGHTS + i, l)] * W[at(g + i, l)] * W[at(g + i, l)]
+                own += W[at(WEIGHTS + i, lane)] * W[at(g + i, lane)] * W[at(g + i, lane)]
             value = own
             for end in range(2):
-                bound, size = W[at(DEP + end, l)], W[at(g + NODES + end, l)]
-                worth = (W[at(WEIGHTS + NODES + end, l)] * size - bound) * size
+                bound, size = W[at(DEP + end, lane)], W[at(g + NODES + end, lane)]
+                worth = (W[at(WEIGHTS + NODES + end, lane)] * size - bound) * size
                 value += worth if bound < np.inf else 0.0
-            W[at(ODD, l)] = W[at(ODD, l)] if own > 0.0 else 1.0
-            W[at(VALUE, l)] = max(value, _LEAST_SHARE * own)
+            W[at(ODD, lane)] = W[at(ODD, lane)] if own > 0.0 else 1.0
+            W[at(VALUE, lane)] = max(value, _LEAST_SHARE * own)
         balanced_impulse(W)
-    for l in range(LANES):
-        z = W[at(IMPULSE, l)]
-        W[at(ODD, l)] = W[at(ODD, l)] if (z > 0.0) & (z < SATURATED) else 1.0
+    for lane in range(LANES):
+        z = W[at(IMPULSE, lane)]
+        W[at(ODD, lane)] = W[at(ODD, lane)] if (z > 0.0) & (z < SATURATED) else 1.0
 
 
 @lane_kernel
@@ -318,12 +324,12 @@ def solve_ends(W: _Array) -> None:
     elements(W)
     first_path(W)
     for j in range(6):
-        for l in range(LANES):
-            W[at(PATH + j * MOST + NODES, l)] = W[at(X0 + j, l)]
-            W[at(PATH + j * MOST + NODES + 1, l)] = W[at(X1 + j, l)]
-    for l in range(LANES):
-        W[at(REMAINING + NODES, l)] = W[at(TOF, l)]
-        W[at(REMAINING + NODES + 1, l)] = 0.0
+        for lane in range(LANES):
+            W[at(PATH + j * MOST + NODES, lane)] = W[at(X0 + j, lane)]
+            W[at(PATH + j * MOST + NODES + 1, lane)] = W[at(X1 + j, lane)]
+    for lane in range(LANES):
+        W[at(REMAINING + NODES, lane)] = W[at(TOF, lane)]
+        W[at(REMAINING + NODES + 1, lane)] = 0.0
     impulse_effects(int(MOST), W)
     add_excess(int(0), W)
     add_excess(int(1), W)
@@ -340,30 +346,45 @@ def read_excess(end: int, W: _Array) -> None:
     e = EXCESS0 + 3 * end
     i = NODES + end
     sign = 1.0 if end == 0 else -1.0
-    for l in range(LANES):
-        scale = sign * W[at(WEIGHTS + i, l)]
-        p = scale * W[at(DUALS + i, l)]
-        q = scale * W[at(DUALS + MOST + i, l)]
-        n = scale * W[at(DUALS + 2 * MOST + i, l)]
-        bound = W[at(DEP + end, l)]
+    for lane in range(LANES):
+        scale = sign * W[at(WEIGHTS + i, lane)]
+        p = scale * W[at(DUALS + i, lane)]
+        q = scale * W[at(DUALS + MOST + i, lane)]
+        n = scale * W[at(DUALS + 2 * MOST + i, lane)]
+        bound = W[at(DEP + end, lane)]
         # What the state has already.
-        hx = W[at(s + 3, l)] - W[at(b + 3, l)]
-        hy = W[at(s + 4, l)] - W[at(b + 4, l)]
-        hz = W[at(s + 5, l)] - W[at(b + 5, l)]
+        hx = W[at(s + 3, lane)] - W[at(b + 3, lane)]
+        hy = W[at(s + 4, lane)] - W[at(b + 4, lane)]
+        hz = W[at(s + 5, lane)] - W[at(b + 5, lane)]
         beyond = 0.0 if bound < np.inf else 1.0
-        x = W[at(AXES, l)] * p + W[at(AXES + 3, l)] * q + W[at(AXES + 6, l)] * n + beyond * hx
-        y = W[at(AXES + 1, l)] * p + W[at(AXES + 4, l)] * q + W[at(AXES + 7, l)] * n + beyond * hy
-        z = W[at(AXES + 2, l)] * p + W[at(AXES + 5, l)] * q + W[at(AXES + 8, l)] * n + beyond * hz
+        x = (
+            W[at(AXES, lane)] * p
+            + W[at(AXES + 3, lane)] * q
+            + W[at(AXES + 6, lane)] * n
+            + beyond * hx
+        )
+        y = (
+            W[at(AXES + 1, lane)] * p
+            + W[at(AXES + 4, lane)] * q
+            + W[at(AXES + 7, lane)] * n
+            + beyond * hy
+        )
+        z = (
+            W[at(AXES + 2, lane)] * p
+            + W[at(AXES + 5, lane)] * q
+            + W[at(AXES + 8, lane)] * n
+            + beyond * hz
+        )
         size = math.sqrt(x * x + y * y + z * z)
         share = bound / size if size > bound else 1.0
         x, y, z = x * share - hx, y * share - hy, z * share - hz
-        rx, ry, rz = W[at(b, l)], W[at(b + 1, l)], W[at(b + 2, l)]
+        rx, ry, rz = W[at(b, lane)], W[at(b + 1, lane)], W[at(b + 2, lane)]
         r = math.sqrt(rx * rx + ry * ry + rz * rz)
         size = x * x + y * y + z * z
         share = min(1.0, _FARTHEST / math.sqrt(max(size * r, 1e-300)))
-        W[at(e, l)] = hx + share * x
-        W[at(e + 1, l)] = hy + share * y
-        W[at(e + 2, l)] = hz + share * z
+        W[at(e, lane)] = hx + share * x
+        W[at(e + 1, lane)] = hy + share * y
+        W[at(e + 2, lane)] = hz + share * z
 
 
 @lane_kernel
@@ -373,41 +394,41 @@ def to_moved_frame(W: _Array) -> None:
     UNIT is its unit of speed, and LEFT its semi-major axis, in those of before.
     """
     for j in range(3):
-        for l in range(LANES):
-            W[at(S0 + 3 + j, l)] = W[at(BODY0 + 3 + j, l)] + W[at(EXCESS0 + j, l)]
-            W[at(S1 + 3 + j, l)] = W[at(BODY1 + 3 + j, l)] + W[at(EXCESS1 + j, l)]
+        for lane in range(LANES):
+            W[at(S0 + 3 + j, lane)] = W[at(BODY0 + 3 + j, lane)] + W[at(EXCESS0 + j, lane)]
+            W[at(S1 + 3 + j, lane)] = W[at(BODY1 + 3 + j, lane)] + W[at(EXCESS1 + j, lane)]
     local_axes(int(0), W)
-    for l in range(LANES):
-        x, y, z = W[at(S0, l)], W[at(S0 + 1, l)], W[at(S0 + 2, l)]
-        u, v, w = W[at(S0 + 3, l)], W[at(S0 + 4, l)], W[at(S0 + 5, l)]
+    for lane in range(LANES):
+        x, y, z = W[at(S0, lane)], W[at(S0 + 1, lane)], W[at(S0 + 2, lane)]
+        u, v, w = W[at(S0 + 3, lane)], W[at(S0 + 4, lane)], W[at(S0 + 5, lane)]
         over = 1.0 / math.sqrt(x * x + y * y + z * z)
         energy = 2.0 * over - (u * u + v * v + w * w)
         fine = energy > 1e-3 * over
-        W[at(ODD, l)] = W[at(ODD, l)] if fine else 1.0
+        W[at(ODD, lane)] = W[at(ODD, lane)] if fine else 1.0
         energy = energy if fine else over
         a = 1.0 / energy
         over_speed = math.sqrt(a)
         unit = 1.0 / over_speed
-        W[at(UNIT, l)] = unit
-        W[at(LEFT, l)] = a
-        W[at(TOF, l)] *= unit * energy
-        W[at(VE, l)] *= over_speed
-        W[at(DEP, l)] *= over_speed
-        W[at(ARR, l)] *= over_speed
-        W[at(GUESS, l)] = max(W[at(TOTAL, l)] * over_speed, 1e-9) / NODES
+        W[at(UNIT, lane)] = unit
+        W[at(LEFT, lane)] = a
+        W[at(TOF, lane)] *= unit * energy
+        W[at(VE, lane)] *= over_speed
+        W[at(DEP, lane)] *= over_speed
+        W[at(ARR, lane)] *= over_speed
+        W[at(GUESS, lane)] = max(W[at(TOTAL, lane)] * over_speed, 1e-9) / NODES
     for part in range(6):
         o = S0 + 3 * part if part < 4 else EXCESS0 + 3 * (part - 4)
-        for l in range(LANES):
-            over_speed = 1.0 / W[at(UNIT, l)]
-            over_unit = over_speed if (part % 2 == 1) | (part > 3) else 1.0 / W[at(LEFT, l)]
-            x, y, z = W[at(o, l)], W[at(o + 1, l)], W[at(o + 2, l)]
+        for lane in range(LANES):
+            over_speed = 1.0 / W[at(UNIT, lane)]
+            over_unit = over_speed if (part % 2 == 1) | (part > 3) else 1.0 / W[at(LEFT, lane)]
+            x, y, z = W[at(o, lane)], W[at(o + 1, lane)], W[at(o + 2, lane)]
             for k in range(3):
                 a = AXES + 3 * k
-                turned = x * W[at(a, l)] + y * W[at(a + 1, l)] + z * W[at(a + 2, l)]
-                W[at(MOVED0 + k, l)] = turned * over_unit
+                turned = x * W[at(a, lane)] + y * W[at(a + 1, lane)] + z * W[at(a + 2, lane)]
+                W[at(SCRATCH + k, lane)] = turned * over_unit
         for k in range(3):
-            for l in range(LANES):
-                W[at(o + k, l)] = W[at(MOVED0 + k, l)]
+            for lane in range(LANES):
+                W[at(o + k, lane)] = W[at(SCRATCH + k, lane)]
 
 
 @lane_kernel
@@ -417,86 +438,89 @@ def end_features(end: int, W: _Array) -> None:
     o = FEATURES + N_GEOMETRY + N_NEED + N_END * end
     e = EXCESS0 + 3 * end
     last = FEATURES + N_GEOMETRY + N_NEED + 2 * N_END + end
-    for l in range(LANES):
-        bound, total = W[at(DEP + end, l)], W[at(TOTAL, l)]
+    for lane in range(LANES):
+        bound, total = W[at(DEP + end, lane)], W[at(TOTAL, lane)]
         open_end = bound == np.inf
-        x, y, z = W[at(e, l)], W[at(e + 1, l)], W[at(e + 2, l)]
+        x, y, z = W[at(e, lane)], W[at(e + 1, lane)], W[at(e + 2, lane)]
         size = math.sqrt(x * x + y * y + z * z)
-        W[at(o, l)] = 1.0 if open_end else bound / (1.0 + bound)
-        W[at(o + 1, l)] = 1.0 if open_end else bound / (total + bound)
-        W[at(o + 2, l)] = 1.0 if open_end else 0.0
-        W[at(o + 3, l)] = 0.0 if open_end | (bound == 0.0) else min(size / bound, 1.0)
-        W[at(o + 4, l)] = size / (total + size + 1e-12)
+        W[at(o, lane)] = 1.0 if open_end else bound / (1.0 + bound)
+        W[at(o + 1, lane)] = 1.0 if open_end else bound / (total + bound)
+        W[at(o + 2, lane)] = 1.0 if open_end else 0.0
+        W[at(o + 3, lane)] = 0.0 if open_end | (bound == 0.0) else min(size / bound, 1.0)
+        W[at(o + 4, lane)] = size / (total + size + 1e-12)
         for k in range(3):
             a = AXES + 3 * k
-            u = x * W[at(a, l)] + y * W[at(a + 1, l)] + z * W[at(a + 2, l)]
-            W[at(o + 5 + k, l)] = clip(u, -3.0, 3.0)
-        impulse = W[at(WEIGHTS + NODES + end, l)] * W[at(DUALS + 3 * MOST + NODES + end, l)]
-        W[at(last, l)] = min(impulse / (impulse + total), 1.0)
+            u = x * W[at(a, lane)] + y * W[at(a + 1, lane)] + z * W[at(a + 2, lane)]
+            W[at(o + 5 + k, lane)] = clip(u, -3.0, 3.0)
+        impulse = W[at(WEIGHTS + NODES + end, lane)] * W[at(DUALS + 3 * MOST + NODES + end, lane)]
+        W[at(last, lane)] = min(impulse / (impulse + total), 1.0)
 
 
 @lane_kernel
 def compared(W: _Array) -> None:
     """Write the last three features, and keep the others within what a net is shown.
 
-    SIZE has the first total, in the unit of before.
+    SIZE receives the hint.
     """
     for j in range(N_GEOMETRY):
-        for l in range(LANES):
-            W[at(FEATURES + j, l)] = clip(W[at(FEATURES + j, l)], -_SHOWN, _SHOWN)
+        for lane in range(LANES):
+            W[at(FEATURES + j, lane)] = clip(W[at(FEATURES + j, lane)], -_SHOWN, _SHOWN)
     o = FEATURES + N_GEOMETRY + N_NEED + 2 * N_END + 2
-    for l in range(LANES):
-        base = W[at(FEATURES + N_GEOMETRY + 6, l)]
-        over_unit = 1.0 / W[at(UNIT, l)]
-        first = max(W[at(MOVED1, l)] * over_unit, 1e-12)
-        over = max(W[at(OVER, l)] * over_unit, 1e-12)
-        left = max(W[at(MIMA, l)] * over_unit, 1e-12)
-        W[at(o, l)] = clip(log(first) - base, -1.5, 1.5)
-        W[at(o + 1, l)] = clip(log(over) - base, _LEAST_LOG, _LARGEST_LOG)
-        W[at(o + 2, l)] = clip(log(left) - base, _LEAST_LOG, _LARGEST_LOG)
+    for lane in range(LANES):
+        base = W[at(FEATURES + N_GEOMETRY + 6, lane)]
+        over_unit = 1.0 / W[at(UNIT, lane)]
+        first = max(W[at(FIRST, lane)] * over_unit, 1e-12)
+        over = max(W[at(OVER, lane)] * over_unit, 1e-12)
+        left = max(W[at(MIMA, lane)] * over_unit, 1e-12)
+        W[at(o, lane)] = clip(log(first) - base, -1.5, 1.5)
+        W[at(o + 1, lane)] = clip(log(over) - base, _LEAST_LOG, _LARGEST_LOG)
+        W[at(o + 2, lane)] = clip(log(left) - base, _LEAST_LOG, _LARGEST_LOG)
         # The hint, before the impulse is kept within what is shown.
-        scale = W[at(LENGTH, l)] * W[at(LEFT, l)] / W[at(SPEED, l)]
-        hint = base - log(W[at(TOF, l)] * scale * W[at(LEFT, l)] / W[at(SPEED, l)])
-        W[at(SIZE, l)] = max(hint, math.log(LEAST_ACCELERATION))
-        W[at(FEATURES + N_GEOMETRY + 6, l)] = max(base, _LEAST_LOG_IMPULSE)
+        scale = W[at(LENGTH, lane)] * W[at(LEFT, lane)] / W[at(SPEED, lane)]
+        hint = base - log(W[at(TOF, lane)] * scale * W[at(LEFT, lane)] / W[at(SPEED, lane)])
+        W[at(SIZE, lane)] = max(hint, math.log(LEAST_ACCELERATION))
+        W[at(FEATURES + N_GEOMETRY + 6, lane)] = max(base, _LEAST_LOG_IMPULSE)
 
 
 @lane_kernel
 def solve_alone(W: _Array, ends_work: EndsWork) -> None:
     """Solve Lambert's problem of the LOOSE legs; those without a solution are ODD."""
     _, ends, _, _, _, v1, v2, _, _, _, _, _ = ends_work
-    for l in range(LANES):
-        if W[at(LOOSE, l)] == 0.0:
+    for lane in range(LANES):
+        if W[at(LOOSE, lane)] == 0.0:
             continue
         for j in range(3):
-            ends[0, j], ends[1, j] = W[at(S0 + j, l)], W[at(S1 + j, l)]
-        lambert_alone(ends[0, :3], ends[1, :3], W[at(TOF, l)], int(0), 1.0, v1, v2)
+            ends[0, j], ends[1, j] = W[at(S0 + j, lane)], W[at(S1 + j, lane)]
+        lambert_alone(ends[0, :3], ends[1, :3], W[at(TOF, lane)], int(0), 1.0, v1, v2)
         for j in range(3):
-            W[at(V1 + j, l)], W[at(V2 + j, l)] = v1[0, j], v2[0, j]
+            W[at(V1 + j, lane)], W[at(V2 + j, lane)] = v1[0, j], v2[0, j]
         if math.isnan(v1[0, 0]):
-            W[at(ODD, l)] = 1.0
+            W[at(ODD, lane)] = 1.0
 
 
 @lane_kernel
 def free_quick_lanes(mu: float, W: _Array, ends_work: EndsWork) -> None:
-    """Write FEATURES of eight legs whose bodies' states, bounds, TOF and VE are given."""
+    """Write FEATURES of eight legs whose bodies' states, bounds, TOF and VE are given.
+
+    Rough excess velocities, and the first path between the ends that they lead to.
+    """
     to_leg_frame(mu, W)
     for j in range(6):
-        for l in range(LANES):
-            W[at(S0 + j, l)] = W[at(BODY0 + j, l)]
-            W[at(S1 + j, l)] = W[at(BODY1 + j, l)]
+        for lane in range(LANES):
+            W[at(S0 + j, lane)] = W[at(BODY0 + j, lane)]
+            W[at(S1 + j, lane)] = W[at(BODY1 + j, lane)]
     lambert(W)
     solve_alone(W, ends_work)
     cut(W)
     begin(W)
     solve_ends(W)
-    for l in range(LANES):
-        W[at(TOTAL, l)] = W[at(IMPULSE, l)] * NODES
+    for lane in range(LANES):
+        W[at(TOTAL, lane)] = W[at(IMPULSE, lane)] * NODES
     read_excess(int(0), W)
     read_excess(int(1), W)
     to_moved_frame(W)
-    for l in range(LANES):
-        W[at(MOVED1, l)] = W[at(TOTAL, l)]
+    for lane in range(LANES):
+        W[at(FIRST, lane)] = W[at(TOTAL, lane)]
     solve_ends(W)
     coast(W)
     geometry(W)
@@ -526,20 +550,20 @@ def free_quick_lane_batch(
     n = len(tof_s)
     odd = 0
     for first in range(0, n, LANES):
-        for l in range(LANES):
+        for lane in range(LANES):
             # The last ones again, where eight are not left.
-            i = min(first + l, n - 1)
+            i = min(first + lane, n - 1)
             for j in range(6):
-                W[at(BODY0 + j, l)] = rv_dep[i, j]
-                W[at(BODY1 + j, l)] = rv_arr[i, j]
-            W[at(TOF, l)] = tof_s[i]
-            W[at(VE, l)] = exhaust[i]
-            W[at(DEP, l)] = bounds[i, 0]
-            W[at(ARR, l)] = bounds[i, 1]
+                W[at(BODY0 + j, lane)] = rv_dep[i, j]
+                W[at(BODY1 + j, lane)] = rv_arr[i, j]
+            W[at(TOF, lane)] = tof_s[i]
+            W[at(VE, lane)] = exhaust[i]
+            W[at(DEP, lane)] = bounds[i, 0]
+            W[at(ARR, lane)] = bounds[i, 1]
         free_quick_lanes(mu, W, ends_work)
-        for l in range(min(LANES, n - first)):
-            i = first + l
-            if W[at(ODD, l)] > 0.0:
+        for lane in range(min(LANES, n - first)):
+            i = first + lane
+            if W[at(ODD, lane)] > 0.0:
                 odd += 1
                 hint[i] = free_quick_features(
                     rv_dep[i], rv_arr[i], tof_s[i], exhaust[i], bounds[i], mu, ends_work,
@@ -547,6 +571,6 @@ def free_quick_lane_batch(
                 )  # fmt: skip
                 continue
             for j in range(N_FREE_QUICK):
-                out[i, j] = W[at(FEATURES + j, l)]
-            hint[i] = W[at(SIZE, l)]
+                out[i, j] = W[at(FEATURES + j, lane)]
+            hint[i] = W[at(SIZE, lane)]
     return odd

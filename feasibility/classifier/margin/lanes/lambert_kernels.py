@@ -18,7 +18,6 @@ from feasibility.classifier.margin.lanes.layout_kernels import (
     LOOSE,
     S0,
     S1,
-    STEP,
     TARGET,
     TOF,
     V1,
@@ -52,32 +51,32 @@ def lambert(W: _Array) -> None:
         improve(W)
         if all_done(W):
             break
-    for l in range(LANES):
-        W[at(LOOSE, l)] = W[at(LOOSE, l)] if W[at(DONE, l)] > 0.0 else 1.0
-    for l in range(LANES):
-        x, lam, q = W[at(X, l)], W[at(LAM, l)], W[at(Q, l)]
+    for lane in range(LANES):
+        W[at(LOOSE, lane)] = W[at(LOOSE, lane)] if W[at(DONE, lane)] > 0.0 else 1.0
+    for lane in range(LANES):
+        x, lam, q = W[at(X, lane)], W[at(LAM, lane)], W[at(Q, lane)]
         y = math.sqrt(lam * lam * x * x + q)
-        gamma = W[at(ARC + _GAMMA, l)]
+        gamma = W[at(ARC + _GAMMA, lane)]
         difference = gamma * (lam * y - x)
-        total = gamma * W[at(ARC + _RHO, l)] * (lam * y + x)
-        transverse = gamma * W[at(ARC + _SIGMA, l)] * (y + lam * x)
-        over1, over2 = 1.0 / W[at(ARC + _N1, l)], 1.0 / W[at(ARC + _N2, l)]
+        total = gamma * W[at(ARC + _RHO, lane)] * (lam * y + x)
+        transverse = gamma * W[at(ARC + _SIGMA, lane)] * (y + lam * x)
+        over1, over2 = 1.0 / W[at(ARC + _N1, lane)], 1.0 / W[at(ARC + _N2, lane)]
         r1, r2 = (difference - total) * over1, -(difference + total) * over2
         t1, t2 = transverse * over1, transverse * over2
-        W[at(V1, l)] = r1 * W[at(ARC + _U, l)] + t1 * W[at(ARC + _T, l)]
-        W[at(V1 + 1, l)] = r1 * W[at(ARC + _U + 1, l)] + t1 * W[at(ARC + _T + 1, l)]
-        W[at(V1 + 2, l)] = r1 * W[at(ARC + _U + 2, l)] + t1 * W[at(ARC + _T + 2, l)]
-        W[at(V2, l)] = r2 * W[at(ARC + _W, l)] + t2 * W[at(ARC + _R, l)]
-        W[at(V2 + 1, l)] = r2 * W[at(ARC + _W + 1, l)] + t2 * W[at(ARC + _R + 1, l)]
-        W[at(V2 + 2, l)] = r2 * W[at(ARC + _W + 2, l)] + t2 * W[at(ARC + _R + 2, l)]
+        W[at(V1, lane)] = r1 * W[at(ARC + _U, lane)] + t1 * W[at(ARC + _T, lane)]
+        W[at(V1 + 1, lane)] = r1 * W[at(ARC + _U + 1, lane)] + t1 * W[at(ARC + _T + 1, lane)]
+        W[at(V1 + 2, lane)] = r1 * W[at(ARC + _U + 2, lane)] + t1 * W[at(ARC + _T + 2, lane)]
+        W[at(V2, lane)] = r2 * W[at(ARC + _W, lane)] + t2 * W[at(ARC + _R, lane)]
+        W[at(V2 + 1, lane)] = r2 * W[at(ARC + _W + 1, lane)] + t2 * W[at(ARC + _R + 1, lane)]
+        W[at(V2 + 2, lane)] = r2 * W[at(ARC + _W + 2, lane)] + t2 * W[at(ARC + _R + 2, lane)]
 
 
 @lane_kernel
 def lay_arc(W: _Array) -> None:
     """Write what Lambert's problem looks like without units."""
-    for l in range(LANES):
-        x1, y1, z1 = W[at(S0, l)], W[at(S0 + 1, l)], W[at(S0 + 2, l)]
-        x2, y2, z2 = W[at(S1, l)], W[at(S1 + 1, l)], W[at(S1 + 2, l)]
+    for lane in range(LANES):
+        x1, y1, z1 = W[at(S0, lane)], W[at(S0 + 1, lane)], W[at(S0 + 2, lane)]
+        x2, y2, z2 = W[at(S1, lane)], W[at(S1 + 1, lane)], W[at(S1 + 2, lane)]
         n1 = math.sqrt(x1 * x1 + y1 * y1 + z1 * z1)
         n2 = math.sqrt(x2 * x2 + y2 * y2 + z2 * z2)
         cx, cy, cz = x2 - x1, y2 - y1, z2 - z1
@@ -97,42 +96,42 @@ def lay_arc(W: _Array) -> None:
         over = 1.0 / semi
         lam = 0.5 * sign * mean * math.sqrt(sx * sx + sy * sy + sz * sz) * over
         q = chord * over
-        target = math.sqrt(2.0 * over) * over * W[at(TOF, l)]
+        target = math.sqrt(2.0 * over) * over * W[at(TOF, lane)]
         root = math.sqrt(q)
         # Transfers of nearly half a turn and of next to nothing lose digits.
         fine = (h > 1e-6 * n1 * n2) & (q > 1e-6)
-        W[at(LOOSE, l)] = 0.0 if fine else 1.0
-        W[at(LAM, l)] = lam
-        W[at(Q, l)] = q
-        W[at(TARGET, l)] = target
-        W[at(DIRECT, l)] = atan2(root, lam) + lam * root
-        W[at(DONE, l)] = 0.0 if fine else 1.0
+        W[at(LOOSE, lane)] = 0.0 if fine else 1.0
+        W[at(LAM, lane)] = lam
+        W[at(Q, lane)] = q
+        W[at(TARGET, lane)] = target
+        W[at(DIRECT, lane)] = atan2(root, lam) + lam * root
+        W[at(DONE, lane)] = 0.0 if fine else 1.0
         o = ARC
-        W[at(o + _U, l)] = ux
-        W[at(o + _U + 1, l)] = uy
-        W[at(o + _U + 2, l)] = uz
-        W[at(o + _T, l)] = hy * uz - hz * uy
-        W[at(o + _T + 1, l)] = hz * ux - hx * uz
-        W[at(o + _T + 2, l)] = hx * uy - hy * ux
-        W[at(o + _W, l)] = wx
-        W[at(o + _W + 1, l)] = wy
-        W[at(o + _W + 2, l)] = wz
-        W[at(o + _R, l)] = hy * wz - hz * wy
-        W[at(o + _R + 1, l)] = hz * wx - hx * wz
-        W[at(o + _R + 2, l)] = hx * wy - hy * wx
-        W[at(o + _N1, l)] = n1
-        W[at(o + _N2, l)] = n2
-        W[at(o + _GAMMA, l)] = math.sqrt(0.5 * semi)
-        W[at(o + _RHO, l)] = (n1 - n2) / chord
-        W[at(o + _SIGMA, l)] = mean * math.sqrt(dx * dx + dy * dy + dz * dz) / chord
+        W[at(o + _U, lane)] = ux
+        W[at(o + _U + 1, lane)] = uy
+        W[at(o + _U + 2, lane)] = uz
+        W[at(o + _T, lane)] = hy * uz - hz * uy
+        W[at(o + _T + 1, lane)] = hz * ux - hx * uz
+        W[at(o + _T + 2, lane)] = hx * uy - hy * ux
+        W[at(o + _W, lane)] = wx
+        W[at(o + _W + 1, lane)] = wy
+        W[at(o + _W + 2, lane)] = wz
+        W[at(o + _R, lane)] = hy * wz - hz * wy
+        W[at(o + _R + 1, lane)] = hz * wx - hx * wz
+        W[at(o + _R + 2, lane)] = hx * wy - hy * wx
+        W[at(o + _N1, lane)] = n1
+        W[at(o + _N2, lane)] = n2
+        W[at(o + _GAMMA, lane)] = math.sqrt(0.5 * semi)
+        W[at(o + _RHO, lane)] = (n1 - n2) / chord
+        W[at(o + _SIGMA, lane)] = mean * math.sqrt(dx * dx + dy * dy + dz * dz) / chord
 
 
 @lane_kernel
 def guess(W: _Array) -> None:
-    """Write the first x, equation 30; hyperbolas are odd."""
-    for l in range(LANES):
-        lam, q = W[at(LAM, l)], W[at(Q, l)]
-        target, direct = W[at(TARGET, l)], W[at(DIRECT, l)]
+    """Write the first x, equation 30; hyperbolas are LOOSE."""
+    for lane in range(LANES):
+        lam, q = W[at(LAM, lane)], W[at(Q, lane)]
+        target, direct = W[at(TARGET, lane)], W[at(DIRECT, lane)]
         one_lam = q / (1.0 + lam) if lam > 0.0 else 1.0 - lam
         parabolic = (2.0 / 3.0) * one_lam * (1.0 + lam + lam * lam)
         fine = target > parabolic
@@ -140,16 +139,16 @@ def guess(W: _Array) -> None:
         long = target >= direct
         power = (2.0 / 3.0) if long else _LN2 / log(direct / parabolic)
         x = exp(ratio * power) - 1.0
-        W[at(X, l)] = min(x, _PARABOLIC)
-        W[at(LOOSE, l)] = W[at(LOOSE, l)] if fine else 1.0
-        W[at(DONE, l)] = W[at(DONE, l)] if fine else 1.0
+        W[at(X, lane)] = min(x, _PARABOLIC)
+        W[at(LOOSE, lane)] = W[at(LOOSE, lane)] if fine else 1.0
+        W[at(DONE, lane)] = W[at(DONE, lane)] if fine else 1.0
 
 
 @lane_kernel
 def improve(W: _Array) -> None:
     """Take one of Householder's steps."""
-    for l in range(LANES):
-        x, lam, q = W[at(X, l)], W[at(LAM, l)], W[at(Q, l)]
+    for lane in range(LANES):
+        x, lam, q = W[at(X, lane)], W[at(LAM, lane)], W[at(Q, lane)]
         lam2 = lam * lam
         lam3 = lam2 * lam
         y = math.sqrt(lam2 * x * x + q)
@@ -159,7 +158,7 @@ def improve(W: _Array) -> None:
         psi = atan2(eta * root, x * y + lam * e)
         over_e, over_y = 1.0 / e, 1.0 / y
         time = (psi / root - x * q + lam * eta) * over_e
-        gap = time - W[at(TARGET, l)]
+        gap = time - W[at(TARGET, lane)]
         over_y2 = over_y * over_y
         d1 = (3.0 * time * x - 2.0 + 2.0 * lam3 * x * over_y) * over_e
         d2 = (3.0 * time + 5.0 * x * d1 + 2.0 * q * lam3 * over_y * over_y2) * over_e
@@ -171,21 +170,21 @@ def improve(W: _Array) -> None:
             * (d1 * d1 - 0.5 * gap * d2)
             / (d1 * (d1 * d1 - gap * d2) + d3 * gap * gap * (1.0 / 6.0))
         )
-        done = W[at(DONE, l)] > 0.0
+        done = W[at(DONE, lane)] > 0.0
         x = x if done else x - step
         inside = (x > -1.0) & (x < _PARABOLIC)
         near = abs(step) <= _STEP_TOLERANCE * min(1.0 + x, 1.0 - x)
-        W[at(LOOSE, l)] = W[at(LOOSE, l)] if inside else 1.0
-        W[at(X, l)] = x
-        W[at(DONE, l)] = 0.0 if inside & (not done) & (not near) else 1.0
+        W[at(LOOSE, lane)] = W[at(LOOSE, lane)] if inside else 1.0
+        W[at(X, lane)] = x
+        W[at(DONE, lane)] = 0.0 if inside & (not done) & (not near) else 1.0
 
 
 @lane_kernel
 def mima(a: int, b: int, out: int, W: _Array) -> None:
     """Write MIMA's acceleration times the flight time, for impulses (3 rows each)."""
-    for l in range(LANES):
-        x1, y1, z1 = W[at(a, l)], W[at(a + 1, l)], W[at(a + 2, l)]
-        x2, y2, z2 = W[at(b, l)], W[at(b + 1, l)], W[at(b + 2, l)]
+    for lane in range(LANES):
+        x1, y1, z1 = W[at(a, lane)], W[at(a + 1, lane)], W[at(a + 2, lane)]
+        x2, y2, z2 = W[at(b, lane)], W[at(b + 1, lane)], W[at(b + 2, lane)]
         dx, dy, dz = x1 + x2, y1 + y2, z1 + z2
         ex, ey, ez = x1 - x2, y1 - y2, z1 - z2
         dd = dx * dx + dy * dy + dz * dz
@@ -195,4 +194,4 @@ def mima(a: int, b: int, out: int, W: _Array) -> None:
         root = math.sqrt(k * k + 4.0)
         # 1 / x of the switch.
         over = 0.5 * (2.0 + (4.0 / (root + k) if k > 0.0 else root - k))
-        W[at(out, l)] = math.sqrt(max(dd + (2.0 * de + ee * over) * over, 0.0))
+        W[at(out, lane)] = math.sqrt(max(dd + (2.0 * de + ee * over) * over, 0.0))

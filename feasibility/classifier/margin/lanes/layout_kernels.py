@@ -22,8 +22,8 @@ MOST = NODES + 2
 S0, S1, X0, X1, D, P = 0, 6, 12, 18, 24, 30
 # The bodies' states, and the velocities of Lambert's arc.
 BODY0, BODY1, V1, V2 = 36, 42, 48, 51
-# Excess velocities, states in another frame, a coasted state, axes.
-EXCESS0, EXCESS1, MOVED0, MOVED1, COASTED, AXES = 54, 57, 60, 66, 72, 78
+# Excess velocities, scratch, the first of two sums, a coasted state, axes.
+EXCESS0, EXCESS1, SCRATCH, FIRST, COASTED, AXES = 54, 57, 60, 66, 72, 78
 MATRIX = 87
 ONES = MATRIX + 36
 TOF, VE, NEAR, IMPULSE, VALUE, TOTAL = ONES, ONES + 1, ONES + 2, ONES + 3, ONES + 4, ONES + 5

@@ -75,7 +75,9 @@ def exp(x: float) -> float:
     r = (x - k * _LN2_HEAD) - k * _LN2_TAIL
     t = 1.0 / 362880.0 + r * (1.0 / 3628800.0 + r * (1.0 / 39916800.0))
     t = 1.0 / 720.0 + r * (1.0 / 5040.0 + r * (1.0 / 40320.0 + r * t))
-    t = 1.0 + r * (1.0 + r * (0.5 + r * (1.0 / 6.0 + r * (1.0 / 24.0 + r * (1.0 / 120.0 + r * t)))))
+    t = 1.0 + r * (
+        1.0 + r * (0.5 + r * (1.0 / 6.0 + r * (1.0 / 24.0 + r * (1.0 / 120.0 + r * t))))
+    )
     result: float = t * _float((_bits(shifted) << 52) + _ONE_BITS)
     return result
 
@@ -86,10 +88,13 @@ def sine_cosine(x: float) -> tuple[float, float]:
     quarter = (x * _TWO_OVER_PI + _ROUND) - _ROUND
     r = (x - quarter * _HALF_PI_HEAD) - quarter * _HALF_PI_TAIL
     z = r * r
-    s = 1.0 / 362880.0 - z * (1.0 / 39916800.0 - z * (1.0 / 6227020800.0))
-    s = r * (1.0 - z * (1.0 / 6.0 - z * (1.0 / 120.0 - z * (1.0 / 5040.0 - z * s))))
-    c = 1.0 / 40320.0 - z * (1.0 / 3628800.0 - z * (1.0 / 479001600.0))
-    c = 1.0 - z * (0.5 - z * (1.0 / 24.0 - z * (1.0 / 720.0 - z * c)))
+    # Pairs of terms, not one after the other, as each waits for the one before.
+    z2 = z * z
+    s = (1.0 / 362880.0 - z * (1.0 / 39916800.0)) + z2 * (1.0 / 6227020800.0)
+    s = (1.0 - z * (1.0 / 6.0)) + z2 * ((1.0 / 120.0 - z * (1.0 / 5040.0)) + z2 * s)
+    s *= r
+    c = (1.0 / 40320.0 - z * (1.0 / 3628800.0)) + z2 * (1.0 / 479001600.0)
+    c = (1.0 - z * 0.5) + z2 * ((1.0 / 24.0 - z * (1.0 / 720.0)) + z2 * c)
     place = quarter - 4.0 * ((0.25 * quarter + _ROUND) - _ROUND)
     odd = abs(place) == 1.0
     sine = c if odd else s
@@ -103,19 +108,13 @@ def sine_cosine(x: float) -> tuple[float, float]:
 def small_sine_cosine(x: float) -> tuple[float, float]:
     """Return sine and cosine of an angle within 0.8."""
     z = x * x
-    s = 1.0 / 362880.0 - z * (1.0 / 39916800.0 - z * (1.0 / 6227020800.0))
-    s = x * (1.0 - z * (1.0 / 6.0 - z * (1.0 / 120.0 - z * (1.0 / 5040.0 - z * s))))
-    c = 1.0 / 40320.0 - z * (1.0 / 3628800.0 - z * (1.0 / 479001600.0))
-    c = 1.0 - z * (0.5 - z * (1.0 / 24.0 - z * (1.0 / 720.0 - z * c)))
-    return s, c
-
-
-@lane_function
-def tiny_sine_cosine(x: float) -> tuple[float, float]:
-    """Return sine and cosine of an angle within 0.05."""
-    z = x * x
-    s = x * (1.0 - z * (1.0 / 6.0 - z * (1.0 / 120.0 - z * (1.0 / 5040.0))))
-    c = 1.0 - z * (0.5 - z * (1.0 / 24.0 - z * (1.0 / 720.0 - z * (1.0 / 40320.0))))
+    # Pairs of terms, not one after the other, as each waits for the one before.
+    z2 = z * z
+    s = (1.0 / 362880.0 - z * (1.0 / 39916800.0)) + z2 * (1.0 / 6227020800.0)
+    s = (1.0 - z * (1.0 / 6.0)) + z2 * ((1.0 / 120.0 - z * (1.0 / 5040.0)) + z2 * s)
+    s *= x
+    c = (1.0 / 40320.0 - z * (1.0 / 3628800.0)) + z2 * (1.0 / 479001600.0)
+    c = (1.0 - z * 0.5) + z2 * ((1.0 / 24.0 - z * (1.0 / 720.0)) + z2 * c)
     return s, c
 
 
