@@ -13,6 +13,7 @@ _ALLOWED = {
     "numpy.typing",
     "typing",
     "numba",
+    "feasibility.runtime.float_bits",
     "feasibility.runtime.jit",
     "feasibility.constants",
 }

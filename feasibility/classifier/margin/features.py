@@ -101,7 +101,7 @@ def quick_features(legs: Legs) -> tuple[_Array, _Array]:
     """Return `QUICK_FEATURES` (n, 40) and a rough hint (n,); otherwise as `margin_features`."""
     from feasibility.classifier.margin.lanes import rendezvous_kernels
 
-    X = np.empty((len(legs), rendezvous_kernels.N_QUICK))
+    X = np.empty((len(legs), len(QUICK_FEATURES)))
     hint = np.empty(len(legs))
     rendezvous_kernels.quick_lane_batch(*_arguments(legs), X, hint)
     return X, _of_rendezvous(legs, hint)

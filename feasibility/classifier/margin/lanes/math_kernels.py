@@ -5,12 +5,8 @@ quick features have: no NaN, infinities or denormals need a sensible answer.
 """
 
 import math
-from typing import Any
 
-from llvmlite import ir
-from numba import types
-from numba.extending import intrinsic
-
+from feasibility.runtime.float_bits import bits_of, float_of
 from feasibility.runtime.jit import lane_function
 
 _ROUND = 1.5 * 2.0**52
@@ -30,33 +26,13 @@ _EIGHTH_TURN = math.tan(math.pi / 8.0)
 _CUBE_ROOT_WORD = float(0x553EF0FF)
 
 
-@intrinsic  # type: ignore[untyped-decorator]
-def _bits(typing_context: Any, value: Any) -> Any:  # noqa: ARG001 (numba's signature)
-    """Return the bits of a float as an integer."""
-
-    def cast(context: Any, builder: Any, signature: Any, args: Any) -> Any:  # noqa: ARG001
-        return builder.bitcast(args[0], ir.IntType(64))
-
-    return types.int64(types.float64), cast
-
-
-@intrinsic  # type: ignore[untyped-decorator]
-def _float(typing_context: Any, value: Any) -> Any:  # noqa: ARG001 (numba's signature)
-    """Return the float that has the bits of an integer."""
-
-    def cast(context: Any, builder: Any, signature: Any, args: Any) -> Any:  # noqa: ARG001
-        return builder.bitcast(args[0], ir.DoubleType())
-
-    return types.float64(types.int64), cast
-
-
 @lane_function
 def log(x: float) -> float:
     """Return the natural logarithm of a positive number."""
-    bits = _bits(x)
+    bits = bits_of(x)
     exponent = (bits - _ROOT_HALF_BITS) >> 52
-    m = _float(bits - (exponent << 52))
-    k = _float(exponent + _ROUND_BITS) - _ROUND
+    m = float_of(bits - (exponent << 52))
+    k = float_of(exponent + _ROUND_BITS) - _ROUND
     # 2 artanh(s), |s| <= 0.1716.
     s = (m - 1.0) / (m + 1.0)
     z = s * s
@@ -78,7 +54,7 @@ def exp(x: float) -> float:
     t = 1.0 + r * (
         1.0 + r * (0.5 + r * (1.0 / 6.0 + r * (1.0 / 24.0 + r * (1.0 / 120.0 + r * t))))
     )
-    result: float = t * _float((_bits(shifted) << 52) + _ONE_BITS)
+    result: float = t * float_of((bits_of(shifted) << 52) + _ONE_BITS)
     return result
 
 
@@ -142,8 +118,8 @@ def atan2(y: float, x: float) -> float:
 @lane_function
 def inverse_cube_root(x: float) -> float:
     """Return x^(-1/3) of a positive number."""
-    word = _float((_bits(x) >> 32) + _ROUND_BITS) - _ROUND
-    y: float = _float(_bits(_CUBE_ROOT_WORD - word * (1.0 / 3.0) + _ROUND) << 32)
+    word = float_of((bits_of(x) >> 32) + _ROUND_BITS) - _ROUND
+    y: float = float_of(bits_of(_CUBE_ROOT_WORD - word * (1.0 / 3.0) + _ROUND) << 32)
     for _ in range(2):
         r = 1.0 - x * y * y * y
         y += y * r * (1.0 / 3.0 + r * (2.0 / 9.0 + r * (14.0 / 81.0)))
