@@ -46,12 +46,14 @@ def shortest_flight(values: _Codes, share: float, log_tof: _Array, level: float)
     code = (level - LOG_MASS_LOW) / LOG_MASS_UNIT
     before = _on(values, share, 0)
     if before >= code:
-        return log_tof[0]
+        first: float = log_tof[0]
+        return first
     for q in range(1, len(log_tof)):
         here = _on(values, share, q)
         if here >= code:
             part = (code - before) / (here - before)
-            return log_tof[q - 1] + part * (log_tof[q] - log_tof[q - 1])
+            found: float = log_tof[q - 1] + part * (log_tof[q] - log_tof[q - 1])
+            return found
         before = here
     return NEVER
 
@@ -66,7 +68,8 @@ def value_at(values: _Codes, share: float, log_tof: _Array, at: float) -> float:
         if at <= log_tof[q]:
             part = (at - log_tof[q - 1]) / (log_tof[q] - log_tof[q - 1])
             before = _on(values, share, q - 1)
-            return before + part * (_on(values, share, q) - before)
+            found: float = before + part * (_on(values, share, q) - before)
+            return found
     return _on(values, share, last)
 
 
@@ -80,7 +83,8 @@ def mass_after(
     beyond = max(math.exp(log_m_star) / mass - 1.0, 0.0)
     most = thrust / exhaust * tof_s / (1.0 + beyond)
     least = min(mass * (1.0 - math.exp(-delta_v / exhaust)), most)
-    return mass - least - (most - least) / (1.0 + BURN_A * beyond**BURN_B)
+    more: float = (most - least) / (1.0 + BURN_A * beyond**BURN_B)
+    return mass - least - more
 
 
 @inner_kernel
