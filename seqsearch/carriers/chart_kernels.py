@@ -40,7 +40,7 @@ def _on(values: _Codes, share: float, q: int) -> float:
     return float(values[0, q]) * (1.0 - share) + float(values[1, q]) * share
 
 
-@inner_kernel
+@kernel
 def shortest_flight(values: _Codes, share: float, log_tof: _Array, level: float) -> float:
     """Return the logarithm of the flight time at which a curve reaches a level; NEVER for none."""
     code = (level - LOG_MASS_LOW) / LOG_MASS_UNIT
@@ -58,7 +58,7 @@ def shortest_flight(values: _Codes, share: float, log_tof: _Array, level: float)
     return NEVER
 
 
-@inner_kernel
+@kernel
 def value_at(values: _Codes, share: float, log_tof: _Array, at: float) -> float:
     """Return the code of a curve at the logarithm of a flight time, held at its ends."""
     last = len(log_tof) - 1
@@ -73,7 +73,7 @@ def value_at(values: _Codes, share: float, log_tof: _Array, at: float) -> float:
     return _on(values, share, last)
 
 
-@inner_kernel
+@kernel
 def mass_after(
     mass: float, m_code: float, v_code: float, tof_s: float, thrust: float, exhaust: float
 ) -> float:
