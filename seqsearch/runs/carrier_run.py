@@ -98,8 +98,13 @@ def is_carrier_search(path: Path) -> bool:
     return (path / STATE).is_file()
 
 
-def resume_carrier(path: Path, limits: Limits, catalogue: str | None) -> int:
-    """Go on with the run of a carrier and return the exit code.
+def resume_carrier(
+    path: Path,
+    limits: Limits,
+    catalogue: str | None,
+    settings: CampaignSettings | None = None,
+) -> int:
+    """Go on with the run of a carrier and return the exit code; settings are those it began with.
 
     Raises
     ------
@@ -124,7 +129,7 @@ def resume_carrier(path: Path, limits: Limits, catalogue: str | None) -> int:
                 "expected a larger --time-limit"
             )
         say(f"{config.problem.name}: going on in {path} after {state.spent_s:.0f} s")
-        return _run(path, config, problem, state, limits)
+        return _run(path, config, problem, state, limits, settings)
 
 
 def _problem(config: Config, catalogue: Catalogue) -> RendezvousProblem:

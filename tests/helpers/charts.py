@@ -4,13 +4,13 @@ import functools
 from dataclasses import dataclass
 
 import numpy as np
-from seqsearch.carriers.leg_chart import STEP_DAYS, ChartMaker, LegChart
-from seqsearch.problems.rendezvous import RendezvousProblem
 
 from feasibility import FeasibilityClassifier, Legs
 from feasibility.legs import Spacecraft
 from feasibility.orbits import synthetic_main_belt
 from feasibility.orbits.neighbours import orbital_metric
+from seqsearch.carriers.leg_chart import STEP_DAYS, ChartMaker, LegChart
+from seqsearch.problems.rendezvous import RendezvousProblem
 
 CRAFT = Spacecraft(m_dry=800.0, thrust=0.3, isp=3000.0)
 M0 = 2000.0

@@ -2,6 +2,10 @@
 
 import numpy as np
 import pytest
+
+from feasibility import InputError
+from feasibility.classifier.predictor import bounded_final_mass
+from feasibility.orbits.lambert import lambert_delta_v
 from seqsearch.carriers.chart_files import has_chart, read_chart, write_chart
 from seqsearch.carriers.chart_kernels import (
     LOG_MASS_LOW,
@@ -14,10 +18,6 @@ from seqsearch.carriers.chart_kernels import (
 )
 from seqsearch.carriers.leg_chart import HOME_TOF_DAYS, STEP_DAYS, TOF_DAYS
 from tests.helpers.charts import CRAFT, M0, charted, known_legs
-
-from feasibility import InputError
-from feasibility.classifier.predictor import bounded_final_mass
-from feasibility.orbits.lambert import lambert_delta_v
 
 
 @pytest.fixture(scope="module")
@@ -161,5 +161,5 @@ def test_a_damaged_file_of_a_chart_is_one_clear_error(world, tmp_path):
     write_chart(world.chart, tmp_path / "chart")
     file = tmp_path / "chart" / "m_star.npy"
     file.write_bytes(file.read_bytes()[:1000])
-    with pytest.raises(InputError, match="m_star.npy: not a chart's file"):
+    with pytest.raises(InputError, match=r"m_star\.npy: not a chart's file"):
         read_chart(tmp_path / "chart")
