@@ -17,7 +17,14 @@ import numpy as np
 
 from feasibility.runtime.cluster import shared
 from seqsearch.carriers.chart_files import has_chart, write_chart
-from seqsearch.carriers.crew import Crew, find_crew, find_probe, polished_probe, rebuilt_probe
+from seqsearch.carriers.crew import (
+    Crew,
+    find_crew,
+    find_probe,
+    polished_probe,
+    rebuilt_probe,
+    repaired_probe,
+)
 from seqsearch.carriers.flight import carrier_of
 from seqsearch.carriers.homing import HomingSettings
 from seqsearch.carriers.leg_chart import ChartPart
@@ -38,9 +45,10 @@ _KEPT_PLANS: Final = 5000
 _BATCHES: Final = (60, 12, 12, 2)
 """Plans in a task of each stage that rates: a task takes half a second and more."""
 
-_ANEW: Final = 0.25
 _TWO_ANEW: Final = 0.2
-_REBUILT: Final = 0.35
+_ANEW: Final = 0.2
+_REBUILT: Final = 0.2
+_REPAIRED: Final = 0.3
 """Shares of attempts to improve; the rest are polished."""
 
 _WIDTHS: Final = (300.0, 5000.0)
@@ -384,6 +392,8 @@ def _improved(context: _Context, crew: Crew, number: int, seed: int) -> Crew | N
     elif kind < _TWO_ANEW + _ANEW + _REBUILT:
         kept = int(rng.integers(1, len(crew.flights[number].itinerary) - 2))
         flight = rebuilt_probe(screen, problem, crew, number, kept, settings)
+    elif kind < _TWO_ANEW + _ANEW + _REBUILT + _REPAIRED:
+        flight = repaired_probe(screen, problem, crew, number, rng)
     else:
         flight = polished_probe(problem, screen.predictor, crew, number, seed)
     return None if flight is None else crew.with_flight(number, flight)

@@ -177,16 +177,18 @@ def expand(
     """Write all children of a rank and return how many; as many as there is room for.
 
     `limits` are the longest duration, the stay, the longest flight (days), the dry and first
-    mass (kg), thrust (N), exhaust velocity (m/s), the reserve in log(m*), and the share of the
-    duration after which there has to be a way home. `weights` are those of the propellant and of
-    the distance from the end.
+    mass (kg), thrust (N), exhaust velocity (m/s), the reserve in log(m*), and the shares of the
+    duration after which a way home is looked for, and has to be there. `weights` are those of
+    the propellant and of the distance from the end. Without ways home tours may end anywhere.
     """
     duration, stay, longest = limits[0], limits[1], limits[2]
     m_dry, m_first, thrust, exhaust = limits[3], limits[4], limits[5], limits[6]
-    reserve, homeward = limits[7], limits[8]
+    reserve, homeward, must = limits[7], limits[8], limits[9]
     w_mass, w_distance = weights[0], weights[1]
     total = 1.0 + w_mass
     n = len(closed)
+    ends = home_index.shape[0] > 0
+    end_stay = stay if ends else 0.0
     count = 0
     for i in range(len(row)):
         place = (ready[i] - t0) / step
@@ -221,7 +223,7 @@ def expand(
                     break
                 arrival = ready[i] + tof
                 elapsed = arrival - first[i]
-                if elapsed + stay >= duration:
+                if elapsed + end_stay > duration:
                     break
                 after = mass_after(
                     mass[i],
@@ -235,7 +237,7 @@ def expand(
                     continue
                 part = elapsed / duration
                 days = NEVER
-                if part > homeward:
+                if ends and part > homeward:
                     left = duration - elapsed - stay
                     days = home_days(
                         arrival + stay,
@@ -254,7 +256,7 @@ def expand(
                         thrust,
                         exhaust,
                     )
-                    if days > left:
+                    if days > left and part > must:
                         continue
                 time_left = max(1.0 - part, _LEAST)
                 mass_left = max((after - m_dry) / (m_first - m_dry), _LEAST)
@@ -284,13 +286,15 @@ def choose(
     caps: NDArray[np.int64],
     n_bodies: int,
     cell_days: float,
+    mass: _Array,
+    mass_step: float,
     taken: NDArray[np.int64],
 ) -> int:
     """Write the positions of those children that go on, best first, and return how many.
 
     `caps` are the width, and the most children of one parent, of one body in one cell of epochs,
-    and of one start. Of children with the same set of bodies at the same place in the same cell
-    the best goes on.
+    and of one start. Of children with the same set of bodies at the same place in the same cell,
+    and within the same step of the mass, the best goes on.
     """
     width, per_parent, per_cell, per_start = caps[0], caps[1], caps[2], caps[3]
     of_parent = np.zeros(len(sets), dtype=np.int32)
@@ -313,7 +317,9 @@ def choose(
             a = (a + np.uint64(1)) & mask
         if cell_count[a] >= per_cell:
             continue
-        kind = (sets[p] + keys[row[c]]) ^ (cell * np.uint64(14029467366897019727)) | np.uint64(1)
+        weight = np.uint64(int(mass[c] // mass_step)) * np.uint64(0x9E3779B97F4A7C15)
+        kind = (sets[p] + keys[row[c]]) ^ (cell * np.uint64(14029467366897019727)) ^ weight
+        kind |= np.uint64(1)
         b = (kind >> np.uint64(20)) & mask
         while set_key[b] != np.uint64(0) and set_key[b] != kind:
             b = (b + np.uint64(1)) & mask

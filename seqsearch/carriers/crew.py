@@ -43,6 +43,14 @@ _ITERATIONS: Final = 12
 _TRIED: Final = 6
 """Predicted tours of one number of visits of which the timetables are made good."""
 
+_SHIFTS: Final = (-5.0, 5.0)
+_SHIFTED: Final = np.arange(-60.0, 61.0, 10.0)
+"""By how many days the departure of a repaired tour is moved."""
+
+_REPAIR_WIDTH: Final = 600
+_MOST_LOST: Final = 3
+"""Width of the beams that repair tours, and the most visits that are replaced."""
+
 _VISIT_DAYS: Final = 170.0
 """What a visit takes."""
 
@@ -206,6 +214,46 @@ def rebuilt_probe(
     own = probe_problem(problem, plan, problem.max_duration_days)
     tails = screen.homing.run(node, plan.second, avoid, settings)
     tours = [replace(tail, itinerary=joined(head, tail.itinerary)) for tail in tails]
+    best = _best_fitted(own, tours, before)
+    return None if best is before else best
+
+
+def repaired_probe(
+    screen: Screen,
+    problem: RendezvousProblem,
+    crew: Crew,
+    number: int,
+    rng: np.random.Generator,
+) -> Flight | None:
+    """Return a better tour of a probe, of which a few visits in a row are replaced; None for none.
+
+    All places, and replacements by as many visits and by one more, are looked at.
+    """
+    before, plan = crew.flights[number], crew.plan
+    visits = before.itinerary.rows[1:-1].tolist()
+    avoid = np.unique([plan.first, plan.second, *crew.closed(number)])
+    own = probe_problem(problem, plan, problem.max_duration_days)
+    first = before.itinerary.t_dep_mjd2000[0] + rng.uniform(*_SHIFTS) + _SHIFTED
+    window = own.first_departure_mjd2000
+    epochs = np.unique(np.clip(first, window[0], window[1]))
+    starts = Nodes.at_start(
+        np.full(len(epochs), plan.first), epochs, np.full(len(epochs), problem.m0)
+    )
+    settings = HomingSettings(
+        width=_REPAIR_WIDTH,
+        propellant_weight=float(rng.uniform(0.1, 0.6)),
+        distance_weight=0.0,
+        results=2,
+        fine=True,
+    )
+    tours: list[Homecoming] = []
+    for place in range(len(visits) + 1):
+        for lost in range(min(_MOST_LOST, len(visits) - place) + 1):
+            for more in range(2):
+                if lost + more:
+                    free = [None] * (lost + more)
+                    steps = [*visits[:place], *free, *visits[place + lost :]]
+                    tours += screen.homing.run(starts, plan.second, avoid, settings, steps)
     best = _best_fitted(own, tours, before)
     return None if best is before else best
 

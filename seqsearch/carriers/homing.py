@@ -4,6 +4,7 @@ No leg is optimised, and none is asked about: all of them are on a chart. A wide
 tenth of a second. `retime` then flies what it finds.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final, final
 
@@ -24,17 +25,27 @@ DAYS_PER_VISIT: Final = 300.0
 burnt their propellant for it."""
 
 _HOMEWARD_SHARE: Final = 0.5
-"""Share of the longest duration after which there has to be a way to the end."""
+"""Share of the longest duration after which there has to be a way to the end. Tours could be far
+away for longer, but beams that stay near the end find better ones."""
+
+_FINE_MUST_SHARE: Final = 0.85
+"""The same where little is left to a beam."""
 
 _DISTANCE: Final = 5000.0
 """m/s of the orbital metric that count as one in the ranking."""
 
 _FARTHEST: Final = 3.0
 _STRETCHES: Final = np.log([1.0, 1.03, 1.07, 1.12, 1.18, 1.25, 1.4])
+_FINE_STRETCHES: Final = np.log([1.0, 1.02, 1.04, 1.07, 1.1, 1.14, 1.18, 1.23, 1.3, 1.4, 1.55])
 """Flight times in units of the shortest."""
 
 _LONGEST_DAYS: Final = 240.0
 _CELL_DAYS: Final = 20.0
+_FINE_CELL_DAYS: Final = 4.0
+_ANY_MASS: Final = 1e9
+_MASS_STEP: Final = 15.0
+"""Nodes alike in epochs (and masses, where it is looked at finely) compete with each other."""
+
 _PER_PARENT: Final = 10
 _PER_CELL: Final = 3
 _START_SHARE: Final = 0.1
@@ -60,6 +71,8 @@ class HomingSettings:
         What the distance from the end counts, at the end of the time.
     results : int
         Most tours of each number of visits that are returned.
+    fine : bool
+        Look finely at flight times and masses, where few orders of visit are left.
     thorough : bool
         Ask the classifier about the ways to the end, also from farther away than the chart's
         neighbours: half a second for an end.
@@ -69,6 +82,7 @@ class HomingSettings:
     propellant_weight: float = 0.2
     distance_weight: float = 0.2
     results: int = 3
+    fine: bool = False
     thorough: bool = True
 
 
@@ -131,8 +145,11 @@ class Homing:
                 craft.exhaust_velocity,
                 np.log1p(reserve),
                 _HOMEWARD_SHARE,
+                _HOMEWARD_SHARE,
             ]
         )
+        self._fine_limits = self._limits.copy()
+        self._fine_limits[-1] = _FINE_MUST_SHARE
         # Sums of random keys tell sets of bodies apart.
         self._keys = np.random.default_rng(0).integers(
             1, np.iinfo(np.uint64).max, len(chart.rows), dtype=np.uint64
@@ -140,7 +157,12 @@ class Homing:
         self._known: tuple[tuple[int, int, int], Ways] | None = None
 
     def run(
-        self, starts: Nodes, end: int, avoid: _Index, settings: HomingSettings
+        self,
+        starts: Nodes,
+        end: int,
+        avoid: _Index,
+        settings: HomingSettings,
+        steps: Sequence[int | None] | None = None,
     ) -> list[Homecoming]:
         """Return tours from starts to an end, those with most visits first, the shortest of them.
 
@@ -154,6 +176,10 @@ class Homing:
             Catalogue rows that are not visited.
         settings : HomingSettings
             How.
+        steps : sequence of int, optional
+            The bodies to be visited in this order, as catalogue rows; None where any will do.
+            Default: any bodies, as many as there is time for. With steps all tours have as many
+            visits.
         """
         chart = self.chart
         place = chart.positions(np.array([end]))
@@ -169,14 +195,37 @@ class Homing:
         ranks = [rank]
         found: list[Homecoming] = []
         distance = self._distances(starts, ways.end)
-        while True:
-            children = self._expanded(rank, ways, closed, distance, settings)
+        masks = None if steps is None else self._masks(closed, steps)
+        while masks is None or len(ranks) <= len(masks):
+            mask = closed if masks is None else masks[len(ranks) - 1]
+            children = self._expanded(rank, ways, mask, distance, settings)
             if len(children.row) == 0:
                 break
-            found += self._homecomings(ranks, children, ways, settings.results)
-            rank = self._chosen(rank, children, settings.width, len(starts))
+            if masks is None or len(ranks) == len(masks):
+                found += self._homecomings(ranks, children, ways, settings.results)
+            rank = self._chosen(rank, children, settings, len(starts))
             ranks.append(rank)
         return sorted(found, key=lambda tour: (-tour.visits, tour.duration_days))
+
+    def _masks(
+        self, closed: NDArray[np.bool_], steps: Sequence[int | None]
+    ) -> list[NDArray[np.bool_]]:
+        """Return which bodies are closed at each step."""
+        named = [
+            None if step is None else self.chart.positions(np.array([step])) for step in steps
+        ]
+        free = closed.copy()
+        for place in named:
+            if place is not None:
+                free[place] = True
+        masks = []
+        for place in named:
+            mask = free
+            if place is not None:
+                mask = np.ones_like(closed)
+                mask[place] = False
+            masks.append(mask)
+        return masks
 
     def _ways(self, end: int, starts: Nodes, thorough: bool) -> Ways:
         """Return the legs to the end, for all times at which tours may end."""
@@ -208,7 +257,8 @@ class Homing:
         chart = self.chart
         interval = np.clip((rank.ready - chart.t0_mjd2000) // STEP_DAYS, 0, chart.intervals - 1)
         entry = interval.astype(np.intp) * len(chart.rows) + rank.row
-        room = int((chart.offsets[entry + 1] - chart.offsets[entry]).sum()) * len(_STRETCHES)
+        stretches = _FINE_STRETCHES if settings.fine else _STRETCHES
+        room = int((chart.offsets[entry + 1] - chart.offsets[entry]).sum()) * len(stretches)
         row, parent = np.empty(room, dtype=np.int32), np.empty(room, dtype=np.int32)
         arrival, mass, score, home = (np.empty(room) for _ in range(4))
         count = expand(
@@ -233,8 +283,8 @@ class Homing:
             ways.log_tof,
             distance[1],
             distance[0],
-            _STRETCHES,
-            self._limits,
+            stretches,
+            self._fine_limits if settings.fine else self._limits,
             np.array([settings.propellant_weight, settings.distance_weight]),
             row,
             parent,
@@ -248,9 +298,13 @@ class Homing:
             *(mass[:count], score[:count], home[:count]),
         )
 
-    def _chosen(self, rank: "_Rank", children: "_Children", width: int, starts: int) -> "_Rank":
-        share = max(_START_SHARE, 2.0 / starts)
-        caps = np.array([width, _PER_PARENT, _PER_CELL, int(np.ceil(share * width))])
+    def _chosen(
+        self, rank: "_Rank", children: "_Children", settings: HomingSettings, starts: int
+    ) -> "_Rank":
+        width, fine = settings.width, settings.fine
+        share = 1.0 if fine else max(_START_SHARE, 2.0 / starts)
+        per_parent, per_cell = (width, width) if fine else (_PER_PARENT, _PER_CELL)
+        caps = np.array([width, per_parent, per_cell, int(np.ceil(share * width))])
         taken = np.empty(width, dtype=np.int64)
         kept = choose(
             np.argsort(children.score, kind="stable"),
@@ -262,7 +316,9 @@ class Homing:
             rank.start,
             caps,
             len(self.chart.rows),
-            _CELL_DAYS,
+            _FINE_CELL_DAYS if fine else _CELL_DAYS,
+            children.mass,
+            _MASS_STEP if fine else _ANY_MASS,
             taken,
         )
         return rank.children(children, taken[:kept], self._keys, self._problem.min_stay_days)

@@ -149,7 +149,10 @@ def test_caps_hold_and_the_best_go_on():
     caps = np.array([60, 5, 2, 20])
     taken = np.empty(60, dtype=np.int64)
     order = np.argsort(score, kind="stable")
-    kept = choose(order, row, parent, arrival, sets, keys, start, caps, bodies, 20.0, taken)
+    mass = np.full(count, 1000.0)
+    kept = choose(
+        *(order, row, parent, arrival, sets, keys, start, caps, bodies, 20.0, mass, 1e9, taken)
+    )
 
     expected: list[int] = []
     for c in order:
