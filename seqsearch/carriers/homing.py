@@ -40,6 +40,9 @@ _FINE_STRETCHES: Final = np.log([1.0, 1.02, 1.04, 1.07, 1.1, 1.14, 1.18, 1.23, 1
 """Flight times in units of the shortest."""
 
 _LONGEST_DAYS: Final = 240.0
+_LIGHTEST: Final = 0.94
+"""Least mass that is predicted, in dry masses: a tour of twelve legs burns 20 to 40 kg less."""
+
 _CELL_DAYS: Final = 20.0
 _FINE_CELL_DAYS: Final = 4.0
 _ANY_MASS: Final = 1e9
@@ -139,7 +142,7 @@ class Homing:
                 problem.max_duration_days,
                 problem.min_stay_days,
                 _LONGEST_DAYS,
-                craft.m_dry,
+                _LIGHTEST * craft.m_dry,
                 problem.m0,
                 craft.thrust,
                 craft.exhaust_velocity,
