@@ -6,50 +6,24 @@ import pytest
 
 from seqsearch import read_tour
 from seqsearch.budget import Limits
-from seqsearch.carriers.campaign import CampaignSettings
 from seqsearch.commands.cli import main
 from seqsearch.problems.problem_file import read_config
 from seqsearch.runs.carrier_run import STATE, begin_carrier
 from seqsearch.runs.fleet import probe_paths
 from seqsearch.tours.carrier.carrier_files import CARRIER, read_carrier
 from seqsearch.tours.carrier.path import fly_carrier
-
-PROBLEM = """
-[problem]
-name = "gtoc7-full"
-
-[spacecraft]
-wet_mass_kg = 2000.0
-dry_mass_kg = 800.0
-thrust_n = 0.3
-isp_s = 3000.0
-
-[mission]
-first_departure_mjd = [59215.0, 65058.0]
-max_duration_days = 2191.5
-min_stay_days = 30.0
-
-[catalogue]
-synthetic_bodies = 8000
-synthetic_seed = 7
-
-[search]
-tof_days_min = 40.0
-tof_days_max = 240.0
-"""
+from tests.helpers.carriers import BELT_PROBLEM, TINY_CAMPAIGN
 
 pytestmark = pytest.mark.slow
-
-TINY = CampaignSettings(bodies=2, pairs=1, crews=2, width=10, improvements=2)
 
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
     folder = tmp_path_factory.mktemp("carrier")
     file = folder / "problem.toml"
-    file.write_text(PROBLEM)
+    file.write_text(BELT_PROBLEM)
     out = folder / "run"
-    assert begin_carrier(read_config(str(file)), out, 3, Limits(workers=1), TINY) == 0
+    assert begin_carrier(read_config(str(file)), out, 3, Limits(workers=1), TINY_CAMPAIGN) == 0
     return out
 
 
@@ -81,7 +55,9 @@ def test_asteroids_are_counted_once(run):
 
 def test_a_run_without_a_limit_is_complete_and_a_damaged_state_is_an_error(run):
     state = json.loads((run / STATE).read_text())
-    assert (state["looked"], state["tried"]) == (2, 2)
+    assert state["looked"][1] == min(200, len(state["rated"])) > 2
+    assert state["looked"][3] == 2
+    assert (state["manned"], state["tried"]) == (2, 4)
     (run / STATE).rename(run / "kept")
     (run / STATE).write_text("{}")
     assert main(["resume", str(run)]) == 2
