@@ -15,7 +15,14 @@ from typing import Any, Final, final
 import numpy as np
 
 from feasibility.runtime.cluster import shared
-from seqsearch.carriers.crew import Crew, find_crew, find_probe, polished_probe, rebuilt_probe
+from seqsearch.carriers.crew import (
+    Crew,
+    find_crew,
+    find_probe,
+    own_problem,
+    polished_probe,
+    rebuilt_probe,
+)
 from seqsearch.carriers.flight import carrier_of
 from seqsearch.carriers.homing import HomingSettings
 from seqsearch.carriers.plans import Plan, Screen
@@ -284,7 +291,8 @@ def _improved(context: _Context, crew: Crew, number: int, seed: int) -> Crew | N
     if kind < _ANEW:
         offset, closed = float(rng.uniform(0.0, 60.0)), crew.closed(number)
         weights = (settings.propellant_weight,)
-        flight = find_probe(screen, problem, crew.plan, closed, settings, offset, weights)
+        own = own_problem(problem, crew, number)
+        flight = find_probe(screen, problem, crew.plan, closed, settings, offset, weights, own)
     elif kind < _ANEW + _REBUILT:
         kept = int(rng.integers(1, len(crew.flights[number].itinerary) - 2))
         flight = rebuilt_probe(screen, problem, crew, number, kept, settings)

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.classifier.predictor import LegPredictor
+from seqsearch.carriers.course import Course
 from seqsearch.carriers.homing import DAYS_PER_VISIT, Homecoming, HomingSettings
 from seqsearch.carriers.plans import SPREAD_DAYS, STAY_DAYS, Plan, Screen
 from seqsearch.core.nodes import Nodes
@@ -54,10 +55,15 @@ class Crew:
         The orbits.
     flights : tuple of Flight
         One a probe. The first and the last row of each are the orbits.
+    course : Course, optional
+        What the mother ship does in between; default: she releases all probes on the first orbit
+        and catches them on the second one. On a course each probe has orbits of its own, which
+        take the place of the asteroids' in `own_problem`.
     """
 
     plan: Plan
     flights: tuple[Flight, ...]
+    course: Course | None = None
 
     def visits(self) -> int:
         """Return the asteroids that count, those of the orbits included."""
@@ -89,13 +95,15 @@ class Crew:
     def waits(self) -> tuple[int | None, int | None]:
         """Return the probes that stay at the asteroids of the first and the second orbit.
 
-        None where no probe has the time, or where the orbits are the same one.
+        None where no probe has the time, or where the orbits are the same one. On a course only
+        those that it provides for.
         """
         slack = [_SIX_YEARS - flight.itinerary.duration_days for flight in self.flights]
         numbers: list[int | None] = [*range(len(slack)), None]
+        ways = [numbers, numbers] if self.course is None else [[k, None] for k in self.course.stays]
         best: tuple[int | None, int | None] = (None, None)
         value = (0, -np.inf)
-        for first, second in product(numbers, numbers):
+        for first, second in product(*ways):
             if self.plan.first == self.plan.second and second is not None:
                 continue
             left = list(slack)
@@ -125,6 +133,20 @@ def probe_problem(
     return replace(problem, first_departure_mjd2000=window, max_duration_days=duration_days)
 
 
+def own_problem(problem: RendezvousProblem, crew: Crew, number: int) -> RendezvousProblem:
+    """Return the problem of one probe of a crew: on a course its own orbits, and when it leaves."""
+    plan, course = crew.plan, crew.course
+    own = probe_problem(problem, plan, problem.max_duration_days)
+    if course is None:
+        return own
+    begin, end = course.window(course.starts[number])
+    return replace(
+        own,
+        catalogue=course.catalogue_for(problem.catalogue, plan.first, plan.second, number),
+        first_departure_mjd2000=(max(begin + TOUCH_DAYS, plan.window_mjd2000), end - TOUCH_DAYS),
+    )
+
+
 def find_probe(
     screen: Screen,
     problem: RendezvousProblem,
@@ -133,9 +155,13 @@ def find_probe(
     settings: HomingSettings,
     offset_days: float = 0.0,
     weights: tuple[float, ...] = WEIGHTS,
+    own: RendezvousProblem | None = None,
 ) -> Flight | None:
-    """Return the best tour of one probe that can be flown in time; None for none."""
-    own = probe_problem(problem, plan, problem.max_duration_days)
+    """Return the best tour of one probe that can be flown in time; None for none.
+
+    `own` is the problem with the probe's own orbits; default: both asteroids'.
+    """
+    own = own or probe_problem(problem, plan, problem.max_duration_days)
     tours = [
         tour
         for weight in weights
@@ -191,7 +217,7 @@ def rebuilt_probe(
     )
     plan = crew.plan
     avoid = np.unique([plan.first, plan.second, *crew.closed(number)])
-    own = probe_problem(problem, plan, problem.max_duration_days)
+    own = own_problem(problem, crew, number)
     tails = screen.homing.run(node, plan.second, avoid, settings)
     tours = [replace(tail, itinerary=joined(head, tail.itinerary)) for tail in tails]
     best = _best_fitted(own, tours, before)
@@ -218,7 +244,7 @@ def polished_probe(
     ids, plan = problem.catalogue.ids, crew.plan
     ends = int(ids[plan.first]), int(ids[plan.second])
     own = replace(
-        probe_problem(problem, plan, problem.max_duration_days),
+        own_problem(problem, crew, number),
         start_ids=ends[:1],
         end_id=ends[1],
         unscored_ids=tuple(sorted(set(ends))),
@@ -232,7 +258,7 @@ def polished_probe(
         rng=np.random.default_rng(seed),
         settings=_POLISH,
     )
-    flight = fly(problem, Itinerary.from_tour(own, result.tour))
+    flight = fly(own, Itinerary.from_tour(own, result.tour))
     return flight if flight is not None and _better(flight, before) else None
 
 
