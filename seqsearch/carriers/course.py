@@ -40,6 +40,9 @@ class Course:
         For each probe the coast from which it is released, and that on which it is caught.
     stays : tuple
         The probes that stay at the asteroids of the first and the second orbit; None for none.
+    stay_epochs : tuple of float
+        When the first of them is released there, and the second one caught, MJD2000. Their stays
+        may be longer than they have to be.
     """
 
     impulses: tuple[CarrierImpulse, ...]
@@ -47,6 +50,7 @@ class Course:
     starts: tuple[int, ...]
     ends: tuple[int, ...]
     stays: tuple[int | None, int | None]
+    stay_epochs: tuple[float, float] = (0.0, 0.0)
 
     def window(self, coast: int) -> tuple[float, float]:
         """Return the epochs between which she is on a coast."""

@@ -34,6 +34,11 @@ STAY_MARGIN_DAYS: Final = 0.002
 WAIT_DAYS: Final = STAY_DAYS + TOUCH_DAYS + STAY_MARGIN_DAYS
 """What it costs a probe to stay at such an asteroid."""
 
+MISSION_DAYS: Final = 2191.5
+"""Longest time from a release to the capture."""
+
+_ROUNDING_DAYS: Final = 1e-6
+
 WEIGHTS: Final = (0.4, 0.9)
 """Weights of propellant in the beams for one probe: which of them balances time and propellant
 depends on the orbits."""
@@ -73,7 +78,7 @@ class Crew:
 
     def slack_days(self) -> float:
         """Return the days that all probes together have left."""
-        return sum(_SIX_YEARS - flight.itinerary.duration_days for flight in self.flights)
+        return sum(MISSION_DAYS - flight.itinerary.duration_days for flight in self.flights)
 
     def mass_kg(self) -> float:
         """Return what is left of all probes."""
@@ -98,31 +103,40 @@ class Crew:
         None where no probe has the time, or where the orbits are the same one. On a course only
         those that it provides for.
         """
-        slack = [_SIX_YEARS - flight.itinerary.duration_days for flight in self.flights]
+        slack = [MISSION_DAYS - flight.itinerary.duration_days for flight in self.flights]
         numbers: list[int | None] = [*range(len(slack)), None]
-        ways = [numbers, numbers] if self.course is None else [[k, None] for k in self.course.stays]
+        course = self.course
+        ways = [numbers, numbers] if course is None else [[k, None] for k in course.stays]
         best: tuple[int | None, int | None] = (None, None)
         value = (0, -np.inf)
         for first, second in product(*ways):
             if self.plan.first == self.plan.second and second is not None:
                 continue
             left = list(slack)
-            for probe in (first, second):
+            for probe, days in ((first, self._wait_days(0)), (second, self._wait_days(1))):
                 if probe is not None:
-                    left[probe] -= WAIT_DAYS
+                    left[probe] -= days
             count = (first is not None) + (second is not None)
             if min(left, default=0.0) >= 0.0 and (count, min(left, default=0.0)) > value:
                 best, value = (first, second), (count, min(left, default=0.0))
         return best
+
+    def _wait_days(self, side: int) -> float:
+        """Return what it costs to stay at the first or second asteroid; inf where that is late."""
+        course = self.course
+        probe = None if course is None else course.stays[side]
+        if course is None or probe is None:
+            return WAIT_DAYS
+        itinerary = self.flights[probe].itinerary
+        begin, end = float(itinerary.t_dep_mjd2000[0]), float(itinerary.t_arr_mjd2000[-1])
+        days = begin - course.stay_epochs[0] if side == 0 else course.stay_epochs[1] - end
+        return days if days >= WAIT_DAYS - _ROUNDING_DAYS else np.inf
 
     def with_flight(self, number: int, flight: Flight) -> "Crew":
         """Return the crew with another tour of one probe."""
         flights = list(self.flights)
         flights[number] = flight
         return replace(self, flights=tuple(flights))
-
-
-_SIX_YEARS: Final = 2191.5
 
 
 def probe_problem(

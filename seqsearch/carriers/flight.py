@@ -11,20 +11,22 @@ from seqsearch.tours.carrier.records import Carrier, CarrierImpulse
 
 def releases_of(crew: Crew) -> list[float]:
     """Return when each probe leaves the mother ship: one that stays there at first, earlier."""
+    epochs = [float(flight.itinerary.t_dep_mjd2000[0]) for flight in crew.flights]
     first, _ = crew.waits()
-    return [
-        float(flight.itinerary.t_dep_mjd2000[0]) - (WAIT_DAYS if number == first else 0.0)
-        for number, flight in enumerate(crew.flights)
-    ]
+    if first is not None:
+        early = epochs[first] - WAIT_DAYS
+        epochs[first] = early if crew.course is None else crew.course.stay_epochs[0]
+    return epochs
 
 
 def captures_of(crew: Crew) -> list[float]:
     """Return when each probe is caught: one that stays there at last, later."""
+    epochs = [float(flight.itinerary.t_arr_mjd2000[-1]) for flight in crew.flights]
     _, second = crew.waits()
-    return [
-        float(flight.itinerary.t_arr_mjd2000[-1]) + (WAIT_DAYS if number == second else 0.0)
-        for number, flight in enumerate(crew.flights)
-    ]
+    if second is not None:
+        late = epochs[second] + WAIT_DAYS
+        epochs[second] = late if crew.course is None else crew.course.stay_epochs[1]
+    return epochs
 
 
 def carrier_of(screen: Screen, crew: Crew) -> Carrier | None:

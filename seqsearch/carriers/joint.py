@@ -7,6 +7,7 @@ then each tour is retimed from its own orbit to its own one, and the two take tu
 """
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Final, final
 
 import numpy as np
@@ -15,7 +16,7 @@ from scipy.optimize import minimize
 
 from feasibility import Legs
 from feasibility.classifier.predictor import LegPredictor
-from seqsearch.carriers.crew import WAIT_DAYS, Crew, own_problem
+from seqsearch.carriers.crew import MISSION_DAYS, TOUCH_DAYS, WAIT_DAYS, Crew, own_problem
 from seqsearch.carriers.flight import captures_of, carrier_of, releases_of
 from seqsearch.carriers.mother import change_orbit
 from seqsearch.carriers.plans import Screen
@@ -32,6 +33,9 @@ LEAD_DAYS: Final = 3.0
 """Least time between an impulse and a release or capture: retiming shifts them a little."""
 
 _FIRST_LEAD_DAYS: Final = 12.0
+
+_RESERVE_DAYS: Final = 15.0
+"""By how much retiming may shift the release of a probe that stays at last for all its time."""
 
 _SPARE_KG: Final = 0.5
 """Propellant of hers that is left, as probes come back some grams heavier or lighter."""
@@ -101,7 +105,7 @@ def joined_crew(
     """
     count = len(crew.flights)
     wishes = Wishes(tuple(rng.uniform(0.5, 1.5, count)), float(rng.uniform(0.1, 1.5)))
-    stirred = float(rng.choice([0.0, 0.3, 1.0]))
+    stirred = float(rng.choice([0.3, 1.0, 2.0]))
     return joined(screen, problem, crew, wishes, rng=rng, stirred=stirred)
 
 
@@ -188,6 +192,10 @@ def schedule_of(screen: Screen, crew: Crew) -> Schedule | None:
         else _steps(releases, captures, stays, impulses)
     )
     rules = screen.rules
+    if stays[1] is not None:
+        steps = _with_late_capture(
+            steps, crew, stays[1], carrier.launch.t_mjd2000 + rules.max_duration_days
+        )
     return Schedule(
         steps,
         screen.catalogue,
@@ -217,7 +225,7 @@ def _steps(
     for k, (epoch, number) in enumerate(releases):
         if k > kept:
             steps.append(Step(Act.IMPULSE, epoch - _FIRST_LEAD_DAYS))
-        steps.append(Step(Act.RELEASE, epoch, number, free=k > kept))
+        steps.append(Step(Act.RELEASE, epoch, number, free=k > kept, stays=k == kept))
     if before == 0:
         steps.append(Step(Act.DEPART, leave.t_mjd2000))
         steps.append(Step(Act.ARRIVE, arrive.t_mjd2000))
@@ -233,7 +241,7 @@ def _steps(
             steps.append(Step(Act.IMPULSE, arrive.t_mjd2000, dv_m_s=arrive.dv_m_s))
         elif not rests:
             steps.append(Step(Act.IMPULSE, epoch - _FIRST_LEAD_DAYS))
-        steps.append(Step(Act.CAPTURE, epoch, number, free=not rests))
+        steps.append(Step(Act.CAPTURE, epoch, number, stays=rests))
     return steps
 
 
@@ -249,8 +257,9 @@ def _steps_again(
     ]
     steps = []
     for epoch, act, number in events:
-        away = course.starts[number] > 0 if act is Act.RELEASE else number != course.stays[1]
-        steps.append(Step(act, epoch, number, free=away))
+        away = act is Act.CAPTURE or course.starts[number] > 0
+        stays = number == course.stays[0 if act is Act.RELEASE else 1]
+        steps.append(Step(act, epoch, number, free=away, stays=stays))
     for k, impulse in enumerate(impulses, 1):
         if k == course.settled - 1:
             steps.append(Step(Act.DEPART, impulse.t_mjd2000))
@@ -261,11 +270,30 @@ def _steps_again(
     return sorted(steps, key=lambda step: step.t_mjd2000)
 
 
+def _with_late_capture(
+    steps: list[Step], crew: Crew, number: int, end_mjd2000: float
+) -> list[Step]:
+    """Return the steps with the range of when the probe is caught that stays at last.
+
+    It may stay for all of the time that it has left.
+    """
+    released = next(step for step in steps if step.probe == number and step.act is Act.RELEASE)
+    reserve = _RESERVE_DAYS if released.free and not released.stays else TOUCH_DAYS
+    latest = released.t_mjd2000 + MISSION_DAYS - reserve
+    earliest = float(crew.flights[number].itinerary.t_arr_mjd2000[-1]) + WAIT_DAYS
+    return [
+        replace(step, range_mjd2000=(earliest, max(earliest, min(latest, end_mjd2000))))
+        if step.probe == number and step.act is Act.CAPTURE
+        else step
+        for step in steps
+    ]
+
+
 def _ends(problem: RendezvousProblem, crew: Crew, schedule: Schedule) -> list[_End]:
     """Return the legs that the schedule may change."""
     ends = []
     for k, step in enumerate(schedule.steps):
-        if step.probe < 0 or not step.free:
+        if step.probe < 0 or not step.free or step.stays:
             continue
         flight = crew.flights[step.probe]
         itinerary = flight.itinerary
@@ -307,12 +335,7 @@ class _Program:
         ]
         self._offsets = np.zeros(len(ends))
         steps = schedule.steps
-        self._gaps = np.array(
-            [
-                0.0 if not (a.free or b.free) or {a.act, b.act} == _WAY else LEAD_DAYS
-                for a, b in zip(steps[:-1], steps[1:], strict=True)
-            ]
-        )
+        self._gaps = np.array([_gap(a, b) for a, b in pairwise(steps)])
         self._memory: tuple[bytes, _Array] = (b"", np.zeros(0))
         # The predictor's error at the legs as they are is taken off.
         now = self._margins(schedule.fly(schedule.start()[None]))[0][0]
@@ -394,7 +417,12 @@ class _Program:
         return margins.T + self._offsets, masses.T
 
 
-_WAY: Final = {Act.DEPART, Act.ARRIVE}
+def _gap(before: Step, after: Step) -> float:
+    """Return the least time between two steps in days."""
+    probes = [step for step in (before, after) if step.probe >= 0]
+    if len(probes) != 1:
+        return 0.0
+    return LEAD_DAYS if probes[0].free and not probes[0].stays else TOUCH_DAYS
 
 
 def _retimed(
@@ -413,7 +441,7 @@ def _retimed(
         changed = [
             (k, step)
             for k, step in enumerate(schedule.steps)
-            if step.probe == number and step.free
+            if step.probe == number and step.free and not step.stays
         ]
         if not changed:
             continue

@@ -9,7 +9,7 @@ from feasibility import InputError
 from feasibility.constants import AU, MJD2000_MJD
 from feasibility.orbits import Catalogue
 from seqsearch.carriers.crew import TOUCH_DAYS, WAIT_DAYS, Crew
-from seqsearch.carriers.flight import releases_of
+from seqsearch.carriers.flight import captures_of, releases_of
 from seqsearch.carriers.plans import SPREAD_DAYS
 from seqsearch.polish.flight import fly
 from seqsearch.polish.itinerary import Itinerary
@@ -100,11 +100,12 @@ def probe_tour(config: Config, catalogue: Catalogue, crew: Crew, number: int) ->
     t_dep, tof = list(itinerary.t_dep_mjd2000), list(itinerary.tof_days)
     first, second = crew.waits()
     if first == number:
-        ids, t_dep, tof = [RELEASE_ID, *ids], [t_dep[0] - WAIT_DAYS, *t_dep], [TOUCH_DAYS, *tof]
+        released = releases_of(crew)[number]
+        ids, t_dep, tof = [RELEASE_ID, *ids], [released, *t_dep], [TOUCH_DAYS, *tof]
     else:
         ids[0] = RELEASE_ID
     if second == number:
-        away = t_dep[-1] + tof[-1] + WAIT_DAYS - TOUCH_DAYS
+        away = captures_of(crew)[number] - TOUCH_DAYS
         ids, t_dep, tof = [*ids, CAPTURE_ID], [*t_dep, away], [*tof, TOUCH_DAYS]
     else:
         ids[-1] = CAPTURE_ID

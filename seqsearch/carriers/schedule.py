@@ -58,6 +58,10 @@ class Step:
         Which is released or caught, from 0; -1 for none.
     free : bool
         Whether the epoch may change.
+    stays : bool
+        Whether the probe is at an asteroid then: it has no leg from or to the mother ship.
+    range_mjd2000 : tuple of float
+        Earliest and latest epoch.
     dv_m_s : tuple of float
         An `IMPULSE`, at first.
     """
@@ -66,6 +70,8 @@ class Step:
     t_mjd2000: float
     probe: int = -1
     free: bool = True
+    stays: bool = False
+    range_mjd2000: tuple[float, float] = (-np.inf, np.inf)
     dv_m_s: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
@@ -144,8 +150,13 @@ class Schedule:
         self, hers_days: float, probes_days: float, impulse_m_s: float
     ) -> list[tuple[float, float]]:
         """Return the ranges of all numbers, by how far epochs of hers and the probes' may move."""
-        days = [hers_days if self.steps[k].probe < 0 else probes_days for k in self._timed]
-        epochs = [(-most / EPOCH_SCALE, most / EPOCH_SCALE) for most in days]
+        epochs = []
+        for k in self._timed:
+            step = self.steps[k]
+            days = probes_days if step.probe >= 0 and not step.stays else hers_days
+            earliest, latest = np.array(step.range_mjd2000) - step.t_mjd2000
+            low, high = max(-days, earliest), min(days, latest)
+            epochs.append((float(low) / EPOCH_SCALE, float(high) / EPOCH_SCALE))
         largest = impulse_m_s / IMPULSE_SCALE
         return [*epochs, *[(-largest, largest)] * (3 * len(self._aimed))]
 
@@ -190,6 +201,7 @@ class Schedule:
         outing = self.fly(x[None])
         impulses, settled = [], 0
         starts, ends = dict[int, int](), dict[int, int]()
+        stay_epochs = {Act.RELEASE: 0.0, Act.CAPTURE: 0.0}
         for k, step in enumerate(self.steps):
             if step.act is Act.RELEASE:
                 starts[step.probe] = len(impulses)
@@ -201,12 +213,15 @@ class Schedule:
                 impulses.append(CarrierImpulse(t_mjd2000=epoch, dv_m_s=(one, two, three)))
             if step.act is Act.ARRIVE:
                 settled = len(impulses)
+            if step.stays:
+                stay_epochs[step.act] = float(outing.t[0, k])
         return Course(
             impulses=tuple(impulses),
             settled=settled,
             starts=tuple(starts[number] for number in sorted(starts)),
             ends=tuple(ends[number] for number in sorted(ends)),
             stays=stays,
+            stay_epochs=(stay_epochs[Act.RELEASE], stay_epochs[Act.CAPTURE]),
         )
 
 

@@ -42,6 +42,7 @@ class _CourseRecord(_Record, frozen=True, kw_only=True):
     starts: tuple[int, ...]
     ends: tuple[int, ...]
     stays: tuple[int | None, int | None]
+    stay_epochs: tuple[float, float]
 
 
 @final
@@ -111,6 +112,7 @@ def write_state(path: Path, state: CampaignState, problem: RendezvousProblem) ->
                     starts=crew.course.starts,
                     ends=crew.course.ends,
                     stays=crew.course.stays,
+                    stay_epochs=crew.course.stay_epochs,
                 ),
             )
             for crew in state.crews
@@ -185,4 +187,5 @@ def _course_of(path: Path, crew: _CrewRecord) -> Course | None:
         starts=course.starts,
         ends=course.ends,
         stays=course.stays,
+        stay_epochs=course.stay_epochs,
     )
