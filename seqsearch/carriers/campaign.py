@@ -1,7 +1,8 @@
 """`Campaign`: the whole search for a mother ship's flight and the tours of her probes.
 
-Stages: rate orbits, look for second orbits, find the tours of all probes for the best plans,
-improve those of the best crew. What each stage found is kept in a `CampaignState`.
+Stages: chart all legs; rate plans that keep to one orbit, roughly and then better; look for second
+orbits; rate the best with wide beams; find the tours of all probes for those; improve the best
+crews. What each stage found is kept in a `CampaignState`.
 """
 
 import functools
@@ -15,29 +16,49 @@ from typing import Any, Final, final
 import numpy as np
 
 from feasibility.runtime.cluster import shared
+from seqsearch.carriers.chart_files import has_chart, write_chart
 from seqsearch.carriers.crew import (
     Crew,
+    find_again,
     find_crew,
-    find_probe,
-    own_problem,
     polished_probe,
     rebuilt_probe,
+    repaired_probe,
 )
 from seqsearch.carriers.flight import carrier_of
 from seqsearch.carriers.homing import HomingSettings
-from seqsearch.carriers.plans import Plan, Screen
+from seqsearch.carriers.joint import joined_crew
+from seqsearch.carriers.leg_chart import ChartPart
+from seqsearch.carriers.plans import RELEASES_DAYS, Plan, Screen
 from seqsearch.deadline import Deadline
 from seqsearch.problems.rendezvous import RendezvousProblem
+from seqsearch.tours.carrier.records import CarrierRules
 
-_NARROW: Final = 40
-"""Width of the beams that rate plans."""
+_ROUGH: Final = HomingSettings(width=40, results=1, thorough=False)
+_BETTER: Final = HomingSettings(width=300, results=1, thorough=False)
+_WIDE: Final = HomingSettings(width=1500, results=1)
+_CREWS: Final = HomingSettings(width=2000, results=12)
+"""Beams that rate plans, in three stages, and those that find crews."""
 
-_WIDE: Final = 150
-_ANEW: Final = 0.25
-_REBUILT: Final = 0.5
-"""Width of the beams that improve a tour, about; shares of attempts; the rest are polished."""
+_KEPT_PLANS: Final = 5000
+"""Plans that are kept of each stage."""
 
-_SHARES: Final = (0.25, 0.4, 0.6)
+_BATCHES: Final = (60, 12, 12, 2)
+"""Plans in a task of each stage that rates: a task takes half a second and more."""
+
+_TWO_ANEW: Final = 0.2
+_ANEW: Final = 0.2
+_REBUILT: Final = 0.2
+_REPAIRED: Final = 0.3
+"""Shares of attempts to improve; the rest are polished."""
+
+_JOINED: Final = (0.1, 0.05)
+"""Share of attempts before them that polish all at once: for a crew that has not been, and has."""
+
+_WIDTHS: Final = (300.0, 5000.0)
+"""Widths of beams that improve a tour."""
+
+_SHARES: Final = (0.15, 0.22, 0.3, 0.42, 0.6)
 """Shares of a time limit after which the stages before improving end."""
 
 
@@ -48,26 +69,33 @@ class CampaignSettings:
 
     Attributes
     ----------
-    bodies : int
-        Asteroids whose orbits are rated.
-    pairs : int
+    rated, sifted : int
+        Plans with one orbit that are rated roughly, and better.
+    continued : int
         Plans for which second orbits are looked for.
-    crews : int
+    judged : int
+        Plans that are rated with wide beams.
+    manned : int
         Plans for which the tours of all probes are found.
-    width : int
-        Width of the beams that find them.
     improvements : int
         Attempts to improve a crew, where there is no time limit.
     kept : int
         Crews that are improved.
+    crews : HomingSettings
+        Beams that find the tours.
+    launch_share : float
+        Share of the launch window that is looked at; where it lies depends on the seed.
     """
 
-    bodies: int = 400
-    pairs: int = 30
-    crews: int = 12
-    width: int = 150
-    improvements: int = 60
-    kept: int = 4
+    rated: int = 100_000
+    sifted: int = 4000
+    continued: int = 150
+    judged: int = 600
+    manned: int = 40
+    improvements: int = 400
+    kept: int = 6
+    crews: HomingSettings = _CREWS
+    launch_share: float = 1.0
 
 
 @final
@@ -83,14 +111,14 @@ class CampaignState:
         Wall-clock time of all sessions; None for no limit.
     catalogue_sha256 : str
         Which asteroid table it is.
-    rated, paired : list of Plan
-        Plans with one orbit, and with two.
-    looked : int
-        Bodies that were rated.
-    joined : int
-        Rated plans for which second orbits were looked for.
+    rated, sifted, continued, judged : list of Plan
+        The best of each stage that rates, best first.
+    looked : list of int
+        How many plans were rated in each of these stages.
     manned : int
-        Paired plans for which crews were found.
+        Judged plans for which crews were looked for.
+    launch_share : float
+        Share of the launch window that is looked at.
     tried : int
         Attempts to improve.
     crews : list of Crew
@@ -103,11 +131,13 @@ class CampaignState:
     limit_s: float | None = None
     catalogue_sha256: str = ""
     rated: list[Plan] = field(default_factory=list)
-    paired: list[Plan] = field(default_factory=list)
-    looked: int = 0
-    joined: int = 0
+    sifted: list[Plan] = field(default_factory=list)
+    continued: list[Plan] = field(default_factory=list)
+    judged: list[Plan] = field(default_factory=list)
+    looked: list[int] = field(default_factory=lambda: [0, 0, 0, 0])
     manned: int = 0
     tried: int = 0
+    launch_share: float = 1.0
     crews: list[Crew] = field(default_factory=list)
     spent_s: float = 0.0
 
@@ -162,53 +192,93 @@ class Campaign:
         """Go on from a state to the end, or until the time is up."""
         self._begin = time.monotonic() - state.spent_s
         self._limit_s = state.limit_s
-        for stage in (self._rate, self._pair, self._man, self._improve):
+        self._chart(state)
+        for stage in (self._rate, self._continue, self._judge, self._man, self._improve):
             stage(state)
 
-    def _rate(self, state: CampaignState) -> None:
-        settings, deadline = self._settings, self._until(_SHARES[0])
-        if state.looked >= settings.bodies or deadline.passed():
-            return
-        rows = self._context.screen.crowded(settings.bodies)
-        offset = float(np.random.default_rng([state.seed, 0]).uniform(0.0, 1.0))
-        while state.looked < len(rows) and not deadline.passed():
-            chunk = rows[state.looked : state.looked + self._at_once]
-            for plans in self._all(_rated, [(int(row), _NARROW, offset) for row in chunk]):
-                state.rated += plans
-            state.looked += len(chunk)
-            state.rated.sort(key=lambda plan: -plan.value)
-            best = state.rated[0].value if state.rated else 0.0
-            self._report(state, f"{state.looked} orbits rated, best {best:.2f}")
-
-    def _pair(self, state: CampaignState) -> None:
-        deadline = self._until(_SHARES[1])
+    def _chart(self, state: CampaignState) -> None:
+        """Ask about all legs, if that has not been done."""
         screen = self._context.screen
-        while state.joined < min(self._settings.pairs, len(state.rated)):
-            plan = state.rated[state.joined]
-            others = screen.continued(plan)
-            for first in range(0, len(others), self._at_once):
-                if deadline.passed():
-                    return
-                chunk = others[first : first + self._at_once]
-                rated = self._all(_valued, [(other, _NARROW) for other in chunk])
-                state.paired += [other for other in rated if other.value > 0.0]
-            state.joined += 1
-            state.paired.sort(key=lambda plan: -plan.value)
-            best = state.paired[0].value if state.paired else 0.0
-            self._report(state, f"{state.joined} plans continued, best {best:.2f}")
+        if has_chart(screen.chart_folder):
+            return
+        count = screen.chart_intervals()
+        parts = []
+        for part in self._all(_charted, [(k,) for k in range(count + 1)]):
+            parts.append(part)
+            if len(parts) % 10 == 0:
+                self._report(state, f"{len(parts)} of {count + 1} intervals charted")
+        chart = screen.chart(parts)
+        write_chart(chart, screen.chart_folder)
+        self._report(state, f"{len(chart.rows)} bodies and {len(chart.target)} pairs on the chart")
+
+    def _rate(self, state: CampaignState) -> None:
+        """Rate plans that keep to one orbit: all of them roughly, the best of them better."""
+        settings, rng = self._settings, np.random.default_rng([state.seed, 0])
+        offset = float(rng.uniform(0.0, 1.0))
+        if not _is_over(state, 0):
+            plans = self._context.screen.candidates(offset)
+            some = rng.permutation(len(plans))[: settings.rated]
+            plans = [plans[k] for k in some]
+            self._stage(state, 0, plans, state.rated, _ROUGH, "rated")
+        self._stage(state, 1, state.rated[: settings.sifted], state.sifted, _BETTER, "rated again")
+
+    def _continue(self, state: CampaignState) -> None:
+        """Look for second orbits, for the best plan of each first one."""
+        best = _different(state.sifted)[: self._settings.continued]
+        plans: list[Plan] = []
+        if not _is_over(state, 2):
+            for others in self._all(_continued, [(plan,) for plan in best]):
+                plans += others
+        self._stage(state, 2, plans, state.continued, _BETTER, "continued")
+
+    def _judge(self, state: CampaignState) -> None:
+        """Rate the best with wide beams."""
+        plans = _different([*state.continued, *state.sifted])[: self._settings.judged]
+        self._stage(state, 3, plans, state.judged, _WIDE, "judged")
+
+    def _stage(
+        self,
+        state: CampaignState,
+        stage: int,
+        plans: Sequence[Plan],
+        found: list[Plan],
+        beams: HomingSettings,
+        name: str,
+    ) -> None:
+        """Rate plans from where the stage is, keep the best."""
+        if _is_over(state, stage):
+            return
+        deadline, size = self._until(_SHARES[stage]), _BATCHES[stage]
+        probes = 1 if stage == 0 else self._context.screen.rules.craft_count
+        while state.looked[stage] < len(plans):
+            if deadline.passed() and found:
+                return
+            first = state.looked[stage]
+            batches = [
+                plans[at : at + size]
+                for at in range(first, first + size * self._at_once, size)
+                if at < len(plans)
+            ]
+            for valued in self._all(_valued, [(batch, beams, probes) for batch in batches]):
+                found += [plan for plan in valued if plan.value > 0.0]
+            state.looked[stage] += sum(map(len, batches))
+            found.sort(key=lambda plan: -plan.value)
+            del found[_KEPT_PLANS:]
+            best = found[0].value if found else 0.0
+            line = f"{state.looked[stage]} of {len(plans)} plans {name}, best {best:.2f}"
+            self._report(state, line)
 
     def _man(self, state: CampaignState) -> None:
-        deadline = self._until(_SHARES[2])
-        plans = _different([*state.paired, *state.rated])
-        while state.manned < min(self._settings.crews, len(plans)):
+        deadline = self._until(_SHARES[4])
+        plans = state.judged[: self._settings.manned]
+        while state.manned < len(plans):
             if deadline.passed() and state.crews:
                 return
             chunk = plans[state.manned : state.manned + self._at_once]
-            wide = HomingSettings(width=self._settings.width)
-            for crew in self._all(_manned, [(plan, wide) for plan in chunk]):
+            for crew in self._all(_manned, [(plan, self._settings.crews) for plan in chunk]):
                 self._keep(state, crew)
             state.manned += len(chunk)
-            self._report(state, f"{state.manned} crews found, {_told(state)}")
+            self._report(state, f"{state.manned} crews looked for, {_told(state)}")
 
     def _improve(self, state: CampaignState) -> None:
         settings, deadline = self._settings, self._until(1.0)
@@ -264,12 +334,32 @@ class Campaign:
         self._on_step(state, line)
 
 
-def _rated(context: _Context, row: int, width: int, offset: float) -> list[Plan]:
-    return context.screen.rate(row, width, offset)
+def launches_of(rules: CarrierRules, state: CampaignState) -> tuple[float, float]:
+    """Return the launches that are looked at: a share of the window, moved by the seed."""
+    first, last = rules.launch_mjd2000
+    days = state.launch_share * (last - first)
+    at = float(np.random.default_rng([state.seed, 2]).uniform(0.0, 1.0))
+    begin = first + at * (last - first - days)
+    return begin, begin + days
 
 
-def _valued(context: _Context, plan: Plan, width: int) -> Plan:
-    return context.screen.valued(plan, width)
+def _is_over(state: CampaignState, stage: int) -> bool:
+    """Tell whether a later stage has begun; then none goes back to this one."""
+    return any(state.looked[stage + 1 :]) or state.manned > 0
+
+
+def _charted(context: _Context, k: int) -> ChartPart:
+    return context.screen.chart_part(k)
+
+
+def _continued(context: _Context, plan: Plan) -> list[Plan]:
+    return context.screen.continued(plan)
+
+
+def _valued(
+    context: _Context, plans: Sequence[Plan], beams: HomingSettings, probes: int
+) -> list[Plan]:
+    return [context.screen.valued(plan, beams, probes) for plan in plans]
 
 
 def _manned(context: _Context, plan: Plan, settings: HomingSettings) -> Crew | None:
@@ -282,20 +372,34 @@ def _improved(context: _Context, crew: Crew, number: int, seed: int) -> Crew | N
     """Look for a better tour of one probe: anew, from some visit on, or by exchanges."""
     screen, problem = context.screen, context.problem
     rng = np.random.default_rng(seed)
+    if rng.random() < _JOINED[crew.course is not None]:
+        return joined_crew(screen, problem, crew, rng)
     settings = HomingSettings(
-        width=int(_WIDE * rng.uniform(0.5, 3.0)),
-        propellant_weight=float(rng.uniform(0.2, 1.5)),
-        distance_weight=float(rng.uniform(0.05, 0.6)),
+        width=int(np.exp(rng.uniform(*np.log(_WIDTHS)))),
+        propellant_weight=float(rng.uniform(0.1, 0.6)),
+        distance_weight=float(rng.uniform(0.05, 0.5)),
+        results=int(rng.integers(2, 12)),
     )
+    weights, offset = (settings.propellant_weight,), float(rng.uniform(0.0, RELEASES_DAYS))
     kind = rng.random()
-    if kind < _ANEW:
-        offset, closed = float(rng.uniform(0.0, 60.0)), crew.closed(number)
-        weights = (settings.propellant_weight,)
-        own = own_problem(problem, crew, number)
-        flight = find_probe(screen, problem, crew.plan, closed, settings, offset, weights, own)
-    elif kind < _ANEW + _REBUILT:
+    if kind < _TWO_ANEW:
+        other = int((number + rng.integers(1, len(crew.flights))) % len(crew.flights))
+        closed = crew.closed(number, other)
+        for probe in (other, number):
+            found = find_again(screen, problem, crew, probe, closed, settings, offset, weights)
+            if found is None:
+                return None
+            crew = crew.with_flight(probe, found)
+            closed = crew.closed(number)
+        return crew
+    if kind < _TWO_ANEW + _ANEW:
+        closed = crew.closed(number)
+        flight = find_again(screen, problem, crew, number, closed, settings, offset, weights)
+    elif kind < _TWO_ANEW + _ANEW + _REBUILT:
         kept = int(rng.integers(1, len(crew.flights[number].itinerary) - 2))
         flight = rebuilt_probe(screen, problem, crew, number, kept, settings)
+    elif kind < _TWO_ANEW + _ANEW + _REBUILT + _REPAIRED:
+        flight = repaired_probe(screen, problem, crew, number, rng)
     else:
         flight = polished_probe(problem, screen.predictor, crew, number, seed)
     return None if flight is None else crew.with_flight(number, flight)

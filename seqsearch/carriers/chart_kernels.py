@@ -2,7 +2,8 @@
 
 With n bodies, intervals of epochs, and q flight times. A curve is log(m*) in kg over the
 logarithm of the flight time; between its q points, and between the two ends of an interval of
-epochs, it is linear. So are the velocity changes of Lambert arcs.
+epochs, it is linear. So are the velocity changes of Lambert arcs. Both are stored as integers of
+16 bits.
 """
 
 import math
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 
 from feasibility.runtime.jit import inner_kernel, kernel
 
-_Floats = NDArray[np.float32]
+_Codes = NDArray[np.uint16]
 _Array = NDArray[np.float64]
 _Index = NDArray[np.int32]
 
@@ -20,34 +21,46 @@ BURN_A = 4.18
 BURN_B = 0.82
 """Of `feasibility.classifier.predictor.bounded_final_mass`."""
 
+LOG_MASS_LOW = 5.0
+LOG_MASS_UNIT = 6.0 / 65535.0
+SPEED_UNIT = 0.2
+"""log(m*/kg) and m/s of codes: the first is LOG_MASS_LOW + LOG_MASS_UNIT times the code."""
+
+HOME_TRIALS = 6
+HOME_STRETCH = 0.12
+"""Flights to the end that are tried: by how much each is longer, in the logarithm."""
+
 NEVER = 1e9
 _LEAST = 1e-6
 
 
 @inner_kernel
-def _on(values: _Floats, share: float, q: int) -> float:
-    """Return a value between the two ends of an interval of epochs."""
+def _on(values: _Codes, share: float, q: int) -> float:
+    """Return a code between the two ends of an interval of epochs."""
     return float(values[0, q]) * (1.0 - share) + float(values[1, q]) * share
 
 
-@inner_kernel
-def shortest_flight(values: _Floats, share: float, log_tof: _Array, level: float) -> float:
+@kernel
+def shortest_flight(values: _Codes, share: float, log_tof: _Array, level: float) -> float:
     """Return the logarithm of the flight time at which a curve reaches a level; NEVER for none."""
+    code = (level - LOG_MASS_LOW) / LOG_MASS_UNIT
     before = _on(values, share, 0)
-    if before >= level:
-        return log_tof[0]
+    if before >= code:
+        first: float = log_tof[0]
+        return first
     for q in range(1, len(log_tof)):
         here = _on(values, share, q)
-        if here >= level:
-            part = (level - before) / (here - before)
-            return log_tof[q - 1] + part * (log_tof[q] - log_tof[q - 1])
+        if here >= code:
+            part = (code - before) / (here - before)
+            found: float = log_tof[q - 1] + part * (log_tof[q] - log_tof[q - 1])
+            return found
         before = here
     return NEVER
 
 
-@inner_kernel
-def value_at(values: _Floats, share: float, log_tof: _Array, at: float) -> float:
-    """Return a curve at the logarithm of a flight time, held at its ends."""
+@kernel
+def value_at(values: _Codes, share: float, log_tof: _Array, at: float) -> float:
+    """Return the code of a curve at the logarithm of a flight time, held at its ends."""
     last = len(log_tof) - 1
     if at <= log_tof[0]:
         return _on(values, share, 0)
@@ -55,19 +68,23 @@ def value_at(values: _Floats, share: float, log_tof: _Array, at: float) -> float
         if at <= log_tof[q]:
             part = (at - log_tof[q - 1]) / (log_tof[q] - log_tof[q - 1])
             before = _on(values, share, q - 1)
-            return before + part * (_on(values, share, q) - before)
+            found: float = before + part * (_on(values, share, q) - before)
+            return found
     return _on(values, share, last)
 
 
-@inner_kernel
+@kernel
 def mass_after(
-    mass: float, log_m_star: float, delta_v: float, tof_s: float, thrust: float, exhaust: float
+    mass: float, m_code: float, v_code: float, tof_s: float, thrust: float, exhaust: float
 ) -> float:
     """Return the mass at arrival, as `bounded_final_mass` estimates it."""
+    log_m_star = LOG_MASS_LOW + LOG_MASS_UNIT * m_code
+    delta_v = SPEED_UNIT * v_code
     beyond = max(math.exp(log_m_star) / mass - 1.0, 0.0)
     most = thrust / exhaust * tof_s / (1.0 + beyond)
     least = min(mass * (1.0 - math.exp(-delta_v / exhaust)), most)
-    return mass - least - (most - least) / (1.0 + BURN_A * beyond**BURN_B)
+    more: float = (most - least) / (1.0 + BURN_A * beyond**BURN_B)
+    return mass - least - more
 
 
 @inner_kernel
@@ -80,34 +97,34 @@ def home_days(
     step: float,
     home_first: int,
     home_index: _Index,
-    home_m: _Floats,
-    home_v: _Floats,
+    home_m: _Codes,
+    home_v: _Codes,
     home_log_tof: _Array,
     reserve: float,
     m_dry: float,
     thrust: float,
     exhaust: float,
-) -> tuple[float, float]:
-    """Return the shortest flight to the end, and the mass after it; NEVER where there is none."""
+) -> float:
+    """Return the shortest flight to the end; NEVER where there is none."""
     place = (ready - t0) / step
-    k = int(math.floor(place)) - home_first
+    k = math.floor(place) - home_first
     if k < 0 or k >= home_index.shape[0]:
-        return NEVER, 0.0
+        return NEVER
     h = home_index[k, row]
     if h < 0:
-        return NEVER, 0.0
+        return NEVER
     share = place - math.floor(place)
     log_tof = shortest_flight(home_m[h], share, home_log_tof, math.log(mass) + reserve)
     if log_tof >= NEVER:
-        return NEVER, 0.0
+        return NEVER
     last = min(math.log(max(left, 1.0)), home_log_tof[-1])
     # Longer flights burn less.
-    for trial in range(6):
-        at = log_tof + 0.12 * trial
+    for trial in range(HOME_TRIALS):
+        at = log_tof + HOME_STRETCH * trial
         if at > last:
             at = last
         if at < log_tof:
-            return NEVER, 0.0
+            return NEVER
         days = math.exp(at)
         after = mass_after(
             mass,
@@ -118,10 +135,10 @@ def home_days(
             exhaust,
         )
         if after >= m_dry:
-            return days, after
+            return days
         if at >= last:
             break
-    return NEVER, 0.0
+    return NEVER
 
 
 @kernel
@@ -130,23 +147,22 @@ def expand(
     ready: _Array,
     first: _Array,
     mass: _Array,
-    visited: _Index,
-    depth: int,
     closed: NDArray[np.bool_],
+    own: _Index,
     offsets: NDArray[np.int64],
     target: _Index,
-    chart_m: _Floats,
-    chart_v: _Floats,
+    chart_m: _Codes,
+    chart_v: _Codes,
     log_tof: _Array,
     t0: float,
     step: float,
     intervals: int,
     home_first: int,
     home_index: _Index,
-    home_m: _Floats,
-    home_v: _Floats,
+    home_m: _Codes,
+    home_v: _Codes,
     home_log_tof: _Array,
-    distance: _Floats,
+    distance: NDArray[np.float32],
     distance_first: int,
     stretches: _Array,
     limits: _Array,
@@ -161,25 +177,27 @@ def expand(
     """Write all children of a rank and return how many; as many as there is room for.
 
     `limits` are the longest duration, the stay, the longest flight (days), the dry and first
-    mass (kg), thrust (N), exhaust velocity (m/s), the reserve in log(m*), and the share of the
-    duration after which there has to be a way home. `weights` are those of the propellant and of
-    the distance from the end.
+    mass (kg), thrust (N), exhaust velocity (m/s), the reserve in log(m*), and the shares of the
+    duration after which a way home is looked for, and has to be there. `weights` are those of
+    the propellant and of the distance from the end. Without ways home tours may end anywhere.
     """
     duration, stay, longest = limits[0], limits[1], limits[2]
     m_dry, m_first, thrust, exhaust = limits[3], limits[4], limits[5], limits[6]
-    reserve, homeward = limits[7], limits[8]
+    reserve, homeward, must = limits[7], limits[8], limits[9]
     w_mass, w_distance = weights[0], weights[1]
     total = 1.0 + w_mass
     n = len(closed)
+    ends = home_index.shape[0] > 0
+    end_stay = stay if ends else 0.0
     count = 0
     for i in range(len(row)):
         place = (ready[i] - t0) / step
-        k = int(math.floor(place))
+        k = math.floor(place)
         if k < 0 or k >= intervals:
             continue
         share = place - k
         base = k * n + row[i]
-        end_k = int(round((first[i] + duration - t0) / step)) - distance_first
+        end_k = round((first[i] + duration - t0) / step) - distance_first
         end_k = min(max(end_k, 0), distance.shape[0] - 1)
         level = math.log(mass[i]) + reserve
         for p in range(offsets[base], offsets[base + 1]):
@@ -187,8 +205,8 @@ def expand(
             if closed[j]:
                 continue
             seen = False
-            for d in range(depth + 1):
-                if visited[i, d] == j:
+            for d in range(own.shape[1]):
+                if own[i, d] == j:
                     seen = True
                     break
             if seen:
@@ -205,7 +223,7 @@ def expand(
                     break
                 arrival = ready[i] + tof
                 elapsed = arrival - first[i]
-                if elapsed + stay >= duration:
+                if elapsed + end_stay > duration:
                     break
                 after = mass_after(
                     mass[i],
@@ -219,13 +237,26 @@ def expand(
                     continue
                 part = elapsed / duration
                 days = NEVER
-                if home_index.shape[0] > 0 and part > homeward:
+                if ends and part > homeward:
                     left = duration - elapsed - stay
-                    days, _ = home_days(
-                        arrival + stay, after, j, left, t0, step, home_first, home_index,
-                        home_m, home_v, home_log_tof, reserve, m_dry, thrust, exhaust,
+                    days = home_days(
+                        arrival + stay,
+                        after,
+                        j,
+                        left,
+                        t0,
+                        step,
+                        home_first,
+                        home_index,
+                        home_m,
+                        home_v,
+                        home_log_tof,
+                        reserve,
+                        m_dry,
+                        thrust,
+                        exhaust,
                     )
-                    if days > left:
+                    if days > left and part > must:
                         continue
                 time_left = max(1.0 - part, _LEAST)
                 mass_left = max((after - m_dry) / (m_first - m_dry), _LEAST)
@@ -255,13 +286,15 @@ def choose(
     caps: NDArray[np.int64],
     n_bodies: int,
     cell_days: float,
+    mass: _Array,
+    mass_step: float,
     taken: NDArray[np.int64],
 ) -> int:
     """Write the positions of those children that go on, best first, and return how many.
 
     `caps` are the width, and the most children of one parent, of one body in one cell of epochs,
-    and of one start. Of children with the same set of bodies at the same place in the same cell
-    the best goes on.
+    and of one start. Of children with the same set of bodies at the same place in the same cell,
+    and within the same step of the mass, the best goes on.
     """
     width, per_parent, per_cell, per_start = caps[0], caps[1], caps[2], caps[3]
     of_parent = np.zeros(len(sets), dtype=np.int32)
@@ -284,7 +317,9 @@ def choose(
             a = (a + np.uint64(1)) & mask
         if cell_count[a] >= per_cell:
             continue
-        kind = (sets[p] + keys[row[c]]) ^ (cell * np.uint64(14029467366897019727)) | np.uint64(1)
+        weight = np.uint64(int(mass[c] // mass_step)) * np.uint64(0x9E3779B97F4A7C15)
+        kind = (sets[p] + keys[row[c]]) ^ (cell * np.uint64(14029467366897019727)) ^ weight
+        kind |= np.uint64(1)
         b = (kind >> np.uint64(20)) & mask
         while set_key[b] != np.uint64(0) and set_key[b] != kind:
             b = (b + np.uint64(1)) & mask

@@ -4,6 +4,7 @@ One probe after another, each leaves its asteroids to none that follow; then eac
 again, with the others' asteroids closed.
 """
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 
 from feasibility.classifier.predictor import LegPredictor
 from seqsearch.carriers.course import Course
-from seqsearch.carriers.homing import DAYS_PER_VISIT, Homecoming, HomingSettings
+from seqsearch.carriers.homing import Homecoming, HomingSettings
 from seqsearch.carriers.plans import SPREAD_DAYS, STAY_DAYS, Plan, Screen
 from seqsearch.core.nodes import Nodes
 from seqsearch.polish import PolishSettings, polish
@@ -39,14 +40,25 @@ MISSION_DAYS: Final = 2191.5
 
 _ROUNDING_DAYS: Final = 1e-6
 
-WEIGHTS: Final = (0.4, 0.9)
+WEIGHTS: Final = (0.15, 0.25, 0.4)
 """Weights of propellant in the beams for one probe: which of them balances time and propellant
 depends on the orbits."""
 
 _POLISH: Final = PolishSettings(rounds=2, moves_per_round=4)
 _ITERATIONS: Final = 12
-_TRIED: Final = 8
-"""Predicted tours of which the timetables are made good until one fits."""
+_TRIED: Final = 6
+"""Predicted tours of one number of visits of which the timetables are made good."""
+
+_SHIFTS: Final = (-5.0, 5.0)
+_SHIFTED: Final = np.arange(-60.0, 61.0, 10.0)
+"""By how many days the departure of a repaired tour is moved."""
+
+_REPAIR_WIDTH: Final = 600
+_MOST_LOST: Final = 3
+"""Width of the beams that repair tours, and the most visits that are replaced."""
+
+_VISIT_DAYS: Final = 170.0
+"""What a visit takes."""
 
 
 @final
@@ -85,15 +97,19 @@ class Crew:
         return float(sum(flight.mass[-1] for flight in self.flights))
 
     def worth(self) -> float:
-        """Return the visits, and the days that are left as shares of a visit."""
-        return self.visits() + self.slack_days() / DAYS_PER_VISIT / 10.0
+        """Return the visits, and what the days that are left are worth.
 
-    def closed(self, but: int | None = None) -> tuple[int, ...]:
-        """Return rows that probes visit, those of one left out."""
+        Days of one probe are worth more than as many of two: a visit needs them together.
+        """
+        days = [MISSION_DAYS - flight.itinerary.duration_days for flight in self.flights]
+        return self.visits() + 0.3 * sum(min(left / _VISIT_DAYS, 1.0) ** 2 for left in days)
+
+    def closed(self, *but: int) -> tuple[int, ...]:
+        """Return rows that probes visit, those of some probes left out."""
         return tuple(
             int(row)
             for number, flight in enumerate(self.flights)
-            if number != but
+            if number not in but
             for row in flight.itinerary.rows[1:-1]
         )
 
@@ -148,7 +164,7 @@ def probe_problem(
 
 
 def own_problem(problem: RendezvousProblem, crew: Crew, number: int) -> RendezvousProblem:
-    """Return the problem of one probe of a crew: on a course its own orbits, and when it leaves."""
+    """Return the problem of one probe of a crew; on a course it has orbits of its own."""
     plan, course = crew.plan, crew.course
     own = probe_problem(problem, plan, problem.max_duration_days)
     if course is None:
@@ -169,13 +185,9 @@ def find_probe(
     settings: HomingSettings,
     offset_days: float = 0.0,
     weights: tuple[float, ...] = WEIGHTS,
-    own: RendezvousProblem | None = None,
 ) -> Flight | None:
-    """Return the best tour of one probe that can be flown in time; None for none.
-
-    `own` is the problem with the probe's own orbits; default: both asteroids'.
-    """
-    own = own or probe_problem(problem, plan, problem.max_duration_days)
+    """Return the best tour of one probe that can be flown in time; None for none."""
+    own = probe_problem(problem, plan, problem.max_duration_days)
     tours = [
         tour
         for weight in weights
@@ -186,15 +198,46 @@ def find_probe(
     return _best_fitted(own, tours, None)
 
 
+def find_again(
+    screen: Screen,
+    problem: RendezvousProblem,
+    crew: Crew,
+    number: int,
+    avoid: Sequence[int],
+    settings: HomingSettings,
+    offset_days: float,
+    weights: tuple[float, ...],
+) -> Flight | None:
+    """Return the best tour of a probe of a crew, as `find_probe`; on a course from its coast."""
+    if crew.course is None:
+        return find_probe(screen, problem, crew.plan, avoid, settings, offset_days, weights)
+    own = own_problem(problem, crew, number)
+    begin, end = own.first_departure_mjd2000
+    plan = replace(crew.plan, window_mjd2000=begin)
+    tours = [
+        tour
+        for weight in weights
+        for tour in screen.tours(
+            plan, replace(settings, propellant_weight=weight), tuple(avoid), offset_days
+        )
+        if tour.itinerary.t_dep_mjd2000[0] < end
+    ]
+    return _best_fitted(own, tours, None)
+
+
 def _best_fitted(
     problem: RendezvousProblem, tours: list[Homecoming], found: Flight | None
 ) -> Flight | None:
     """Return the best of predicted tours that can be flown in time, or what there is already."""
     different = {tuple(tour.itinerary.rows.tolist()): tour for tour in reversed(tours)}
     ordered = sorted(different.values(), key=lambda tour: (-tour.visits, tour.duration_days))
-    for tour in ordered[:_TRIED]:
+    tried: Counter[int] = Counter()
+    for tour in ordered:
         if found is not None and tour.visits < len(found.itinerary) - 1:
             break
+        tried[tour.visits] += 1
+        if tried[tour.visits] > _TRIED:
+            continue
         flight = fitted(problem, tour.itinerary)
         if flight is not None and (found is None or _better(flight, found)):
             found = flight
@@ -234,6 +277,46 @@ def rebuilt_probe(
     own = own_problem(problem, crew, number)
     tails = screen.homing.run(node, plan.second, avoid, settings)
     tours = [replace(tail, itinerary=joined(head, tail.itinerary)) for tail in tails]
+    best = _best_fitted(own, tours, before)
+    return None if best is before else best
+
+
+def repaired_probe(
+    screen: Screen,
+    problem: RendezvousProblem,
+    crew: Crew,
+    number: int,
+    rng: np.random.Generator,
+) -> Flight | None:
+    """Return a better tour of a probe, of which a few visits in a row are replaced; None for none.
+
+    All places, and replacements by as many visits and by one more, are looked at.
+    """
+    before, plan = crew.flights[number], crew.plan
+    visits = before.itinerary.rows[1:-1].tolist()
+    avoid = np.unique([plan.first, plan.second, *crew.closed(number)])
+    own = own_problem(problem, crew, number)
+    first = before.itinerary.t_dep_mjd2000[0] + rng.uniform(*_SHIFTS) + _SHIFTED
+    window = own.first_departure_mjd2000
+    epochs = np.unique(np.clip(first, window[0], window[1]))
+    starts = Nodes.at_start(
+        np.full(len(epochs), plan.first), epochs, np.full(len(epochs), problem.m0)
+    )
+    settings = HomingSettings(
+        width=_REPAIR_WIDTH,
+        propellant_weight=float(rng.uniform(0.1, 0.6)),
+        distance_weight=0.0,
+        results=2,
+        fine=True,
+    )
+    tours: list[Homecoming] = []
+    for place in range(len(visits) + 1):
+        for lost in range(min(_MOST_LOST, len(visits) - place) + 1):
+            for more in range(2):
+                if lost + more:
+                    free = [None] * (lost + more)
+                    steps = [*visits[:place], *free, *visits[place + lost :]]
+                    tours += screen.homing.run(starts, plan.second, avoid, settings, steps)
     best = _best_fitted(own, tours, before)
     return None if best is before else best
 

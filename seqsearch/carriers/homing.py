@@ -1,28 +1,21 @@
 """`Homing`: beams of predicted legs that start at one orbit and have to end at another.
 
-No leg is optimised: the predictor's flight times and masses are good to a few percent, and beams
-that tell good orbits from poor ones take a second. `retime` then flies what they find.
+No leg is optimised, and none is asked about: all of them are on a chart. A wide beam takes a
+tenth of a second. `retime` then flies what it finds.
 """
 
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Final, final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.classifier.predictor import LegPredictor, bounded_final_mass
-from feasibility.orbits import OrbitalNeighbours
-from feasibility.orbits.neighbours import orbital_metric
-from seqsearch.beam.forecast import Forecast, PairCurves
-from seqsearch.beam.frontiers.depth import DepthFrontier
-from seqsearch.beam.rankings.balanced import BalancedRanking
-from seqsearch.core.candidates import reached
-from seqsearch.core.hop_margins import log_margin, quick_margin_of
-from seqsearch.core.margin_curves import MarginCurves, flight_times
+from seqsearch.carriers.chart_kernels import choose, expand
+from seqsearch.carriers.leg_chart import STEP_DAYS, TOF_DAYS, ChartMaker, LegChart, Ways
 from seqsearch.core.nodes import Nodes
-from seqsearch.core.problem import Problem
 from seqsearch.polish.itinerary import Itinerary
-from seqsearch.settings import SearchSettings
+from seqsearch.problems.rendezvous import RendezvousProblem
 
 _Array = NDArray[np.float64]
 _Index = NDArray[np.intp]
@@ -31,29 +24,36 @@ DAYS_PER_VISIT: Final = 300.0
 """Time that is worth a visit. A visit takes 170 days; but tours with time to spare have mostly
 burnt their propellant for it."""
 
-_SHORTEST_DAYS: Final = 40.0
-_LONGEST_DAYS: Final = 500.0
-_FLIGHTS: Final = 6
-"""Flight times to the end that are asked about."""
-
-_HOME_STRETCHES: Final = (1.0, 1.1, 1.2, 1.35, 1.6, 2.0)
-"""Flights to the end in units of the shortest."""
-
 _HOMEWARD_SHARE: Final = 0.5
-"""Share of the longest duration after which there has to be a way to the end."""
+"""Share of the longest duration after which there has to be a way to the end. Tours could be far
+away for longer, but beams that stay near the end find better ones."""
+
+_FINE_MUST_SHARE: Final = 0.85
+"""The same where little is left to a beam."""
 
 _DISTANCE: Final = 5000.0
 """m/s of the orbital metric that count as one in the ranking."""
 
 _FARTHEST: Final = 3.0
+_STRETCHES: Final = np.log([1.0, 1.03, 1.07, 1.12, 1.18, 1.25, 1.4])
+_FINE_STRETCHES: Final = np.log([1.0, 1.02, 1.04, 1.07, 1.1, 1.14, 1.18, 1.23, 1.3, 1.4, 1.55])
+"""Flight times in units of the shortest."""
 
-_SPARE: Final = 2.0
-"""Pairs that get a good answer, for each node that goes on."""
+_LONGEST_DAYS: Final = 240.0
+_CELL_DAYS: Final = 20.0
+_FINE_CELL_DAYS: Final = 4.0
+_ANY_MASS: Final = 1e9
+_MASS_STEP: Final = 15.0
+"""Nodes alike in epochs (and masses, where it is looked at finely) compete with each other."""
 
-_STRETCHES: Final = (1.0, 1.03, 1.07, 1.12, 1.18, 1.25, 1.4)
-_ELAPSED: Final = (0.3, 0.7, 0.8, 0.9)
-_WIDTHS: Final = (2.0, 0.5, 0.5, 2.0)
-"""Width in units of that asked for, by the share of the longest duration that has elapsed."""
+_PER_PARENT: Final = 10
+_PER_CELL: Final = 3
+_START_SHARE: Final = 0.1
+"""Most children of one node, nodes at one body in a cell of epochs, and share of the width of
+nodes that left at the same time."""
+
+_LOOKED_AT: Final = 8
+"""Ends that are looked at for each that is kept: many differ in their flight times only."""
 
 
 @final
@@ -71,12 +71,19 @@ class HomingSettings:
         What the distance from the end counts, at the end of the time.
     results : int
         Most tours of each number of visits that are returned.
+    fine : bool
+        Look finely at flight times and masses, where few orders of visit are left.
+    thorough : bool
+        Ask the classifier about the ways to the end, also from farther away than the chart's
+        neighbours: half a second for an end.
     """
 
-    width: int = 60
-    propellant_weight: float = 0.6
+    width: int = 300
+    propellant_weight: float = 0.2
     distance_weight: float = 0.2
     results: int = 3
+    fine: bool = False
+    thorough: bool = True
 
 
 @final
@@ -105,32 +112,57 @@ class Homecoming:
 
 @final
 class Homing:
-    """Runs beams for one problem.
+    """Runs beams over one chart.
 
     Parameters
     ----------
-    problem : Problem
-        Bodies, window, stays; its longest duration may be more than is allowed, as predicted
+    chart : LegChart
+        Its bodies include the start and the end.
+    maker : ChartMaker
+        Of the same chart; answers what is not on it.
+    problem : RendezvousProblem
+        Stays and masses; its longest duration may be more than is allowed, as predicted
         timetables are not yet the best.
-    predictor : LegPredictor
-        Predicts the legs.
-    base : SearchSettings
-        Caps of the frontier, and the range of flight times.
-    threads : int
-        Threads that ask the predictor.
+    reserve : float
+        By how much m* has to exceed the mass, as a share.
     """
 
     def __init__(
-        self, problem: Problem, predictor: LegPredictor, base: SearchSettings, threads: int = 1
+        self, chart: LegChart, maker: ChartMaker, problem: RendezvousProblem, reserve: float
     ) -> None:
+        self.chart = chart
+        self._maker = maker
         self._problem = problem
-        self._quick = quick_margin_of(predictor)
-        self._base = base
-        neighbours = OrbitalNeighbours(problem.catalogue, base.reference_tof_days)
-        self._forecast = Forecast(problem, predictor, neighbours, threads)
+        craft = problem.spacecraft
+        self._limits = np.array(
+            [
+                problem.max_duration_days,
+                problem.min_stay_days,
+                _LONGEST_DAYS,
+                craft.m_dry,
+                problem.m0,
+                craft.thrust,
+                craft.exhaust_velocity,
+                np.log1p(reserve),
+                _HOMEWARD_SHARE,
+                _HOMEWARD_SHARE,
+            ]
+        )
+        self._fine_limits = self._limits.copy()
+        self._fine_limits[-1] = _FINE_MUST_SHARE
+        # Sums of random keys tell sets of bodies apart.
+        self._keys = np.random.default_rng(0).integers(
+            1, np.iinfo(np.uint64).max, len(chart.rows), dtype=np.uint64
+        )
+        self._known: tuple[tuple[int, int, int], Ways] | None = None
 
     def run(
-        self, starts: Nodes, end: int, avoid: _Index, settings: HomingSettings
+        self,
+        starts: Nodes,
+        end: int,
+        avoid: _Index,
+        settings: HomingSettings,
+        steps: Sequence[int | None] | None = None,
     ) -> list[Homecoming]:
         """Return tours from starts to an end, those with most visits first, the shortest of them.
 
@@ -144,159 +176,272 @@ class Homing:
             Catalogue rows that are not visited.
         settings : HomingSettings
             How.
+        steps : sequence of int, optional
+            The bodies to be visited in this order, as catalogue rows; None where any will do.
+            Default: any bodies, as many as there is time for. With steps all tours have as many
+            visits.
         """
-        ranks = [_numbered(starts)]
+        chart = self.chart
+        place = chart.positions(np.array([end]))
+        rows = chart.positions(starts.row)
+        if len(place) == 0 or len(rows) < len(starts):
+            return []
+        ways = self._ways(int(place[0]), starts, settings.thorough)
+        closed = np.zeros(len(chart.rows), dtype=np.bool_)
+        closed[chart.positions(avoid)] = True
+        closed[chart.positions(np.unique(starts.visited))] = True
+        closed[place] = True
+        rank = _Rank.first(starts, rows)
+        ranks = [rank]
         found: list[Homecoming] = []
-        ranking = _HomingRanking(end, settings)
-        while True:
-            children = self._children(ranks[-1], end, avoid, ranking, settings)
-            if len(children) == 0:
+        distance = self._distances(starts, ways.end)
+        masks = None if steps is None else self._masks(closed, steps)
+        while masks is None or len(ranks) <= len(masks):
+            mask = closed if masks is None else masks[len(ranks) - 1]
+            children = self._expanded(rank, ways, mask, distance, settings)
+            if len(children.row) == 0:
                 break
-            ranks.append(_numbered(children))
-            found += self._homecomings(ranks, end, settings.results)
+            if masks is None or len(ranks) == len(masks):
+                found += self._homecomings(ranks, children, ways, settings.results)
+            rank = self._chosen(rank, children, settings, len(starts))
+            ranks.append(rank)
         return sorted(found, key=lambda tour: (-tour.visits, tour.duration_days))
 
-    def _children(
+    def _masks(
+        self, closed: NDArray[np.bool_], steps: Sequence[int | None]
+    ) -> list[NDArray[np.bool_]]:
+        """Return which bodies are closed at each step."""
+        named = [
+            None if step is None else self.chart.positions(np.array([step])) for step in steps
+        ]
+        free = closed.copy()
+        for place in named:
+            if place is not None:
+                free[place] = True
+        masks = []
+        for place in named:
+            mask = free
+            if place is not None:
+                mask = np.ones_like(closed)
+                mask[place] = False
+            masks.append(mask)
+        return masks
+
+    def _ways(self, end: int, starts: Nodes, thorough: bool) -> Ways:
+        """Return the legs to the end, for all times at which tours may end."""
+        begin = float(starts.t_first_mjd2000.min()) + _HOMEWARD_SHARE * self._limits[0]
+        first = self.chart.interval(begin)
+        last = self.chart.interval(float(starts.t_first_mjd2000.max()) + self._limits[0])
+        if not thorough:
+            return self.chart.ways(end, first, last)
+        if self._known is None or self._known[0] != (end, first, last):
+            self._known = (end, first, last), self._maker.ways(end, first, last)
+        return self._known[1]
+
+    def _distances(self, starts: Nodes, end: int) -> tuple[int, NDArray[np.float32]]:
+        """Return (k, n) how far bodies are from the end when tours end, from an interval on."""
+        last = starts.t_first_mjd2000 + self._limits[0]
+        first = self.chart.interval(float(last.min()))
+        points = self.chart.points[first : self.chart.interval(float(last.max())) + 2]
+        away = np.sqrt(((points - points[:, end, None]) ** 2).sum(axis=2))
+        return first, np.minimum(away / np.float32(_DISTANCE), np.float32(_FARTHEST))
+
+    def _expanded(
         self,
-        nodes: Nodes,
-        end: int,
-        avoid: _Index,
-        ranking: "_HomingRanking",
+        rank: "_Rank",
+        ways: Ways,
+        closed: NDArray[np.bool_],
+        distance: tuple[int, NDArray[np.float32]],
         settings: HomingSettings,
-    ) -> Nodes:
-        """Return the nodes of the next rank, from all of which there is a way to the end."""
-        problem = self._problem
-        here = self._base.with_(
-            neighbours=16,
-            coarse_flight_times=5,
-            flight_time_stretches=_STRETCHES,
-            beam_width=self._width(nodes, settings.width),
+    ) -> "_Children":
+        chart = self.chart
+        interval = np.clip((rank.ready - chart.t0_mjd2000) // STEP_DAYS, 0, chart.intervals - 1)
+        entry = interval.astype(np.intp) * len(chart.rows) + rank.row
+        stretches = _FINE_STRETCHES if settings.fine else _STRETCHES
+        room = int((chart.offsets[entry + 1] - chart.offsets[entry]).sum()) * len(stretches)
+        row, parent = np.empty(room, dtype=np.int32), np.empty(room, dtype=np.int32)
+        arrival, mass, score, home = (np.empty(room) for _ in range(4))
+        count = expand(
+            rank.row,
+            rank.ready,
+            rank.first_departure,
+            rank.mass,
+            closed,
+            rank.own,
+            chart.offsets,
+            chart.target,
+            chart.m_star,
+            chart.delta_v,
+            np.log(TOF_DAYS),
+            chart.t0_mjd2000,
+            STEP_DAYS,
+            chart.intervals,
+            ways.first,
+            ways.index,
+            ways.m_star,
+            ways.delta_v,
+            ways.log_tof,
+            distance[1],
+            distance[0],
+            stretches,
+            self._fine_limits if settings.fine else self._limits,
+            np.array([settings.propellant_weight, settings.distance_weight]),
+            row,
+            parent,
+            arrival,
+            mass,
+            score,
+            home,
+        )
+        return _Children(
+            *(row[:count], parent[:count], arrival[:count]),
+            *(mass[:count], score[:count], home[:count]),
         )
 
-        def allows(nodes: Nodes, parent: _Index, target: _Index) -> NDArray[np.bool_]:  # noqa: ARG001
-            return ~np.isin(target, avoid)
+    def _chosen(
+        self, rank: "_Rank", children: "_Children", settings: HomingSettings, starts: int
+    ) -> "_Rank":
+        width, fine = settings.width, settings.fine
+        share = 1.0 if fine else max(_START_SHARE, 2.0 / starts)
+        per_parent, per_cell = (width, width) if fine else (_PER_PARENT, _PER_CELL)
+        caps = np.array([width, per_parent, per_cell, int(np.ceil(share * width))])
+        taken = np.empty(width, dtype=np.int64)
+        kept = choose(
+            np.argsort(children.score, kind="stable"),
+            children.row,
+            children.parent,
+            children.arrival,
+            rank.sets,
+            self._keys,
+            rank.start,
+            caps,
+            len(self.chart.rows),
+            _FINE_CELL_DAYS if fine else _CELL_DAYS,
+            children.mass,
+            _MASS_STEP if fine else _ANY_MASS,
+            taken,
+        )
+        return rank.children(children, taken[:kept], self._keys, self._problem.min_stay_days)
 
-        surveys = self._forecast.surveys(nodes, here, allows)
-        pairs = [survey.pairs for survey in surveys if len(survey.pairs)]
-        if not pairs:
-            return nodes.take(np.zeros(0, dtype=np.intp))
-        frontier = DepthFrontier(here.frontier, problem, ranking)
-        known = PairCurves.concatenate(pairs)
-        candidates, m_final, pair = self._forecast.outlook(nodes, known, here)
-        quick = reached(problem, nodes, candidates, m_final)
-        known = known.take(np.unique(pair[frontier.admit(quick, here.beam_width, _SPARE)]))
-        known = self._forecast.sharpened(nodes, known, here)
-        candidates, m_final, _ = self._forecast.outlook(nodes, known, here)
-        enough = m_final >= problem.spacecraft.m_dry
-        children = reached(problem, nodes, candidates.take(enough), m_final[enough])
-        elapsed = children.t_arr_mjd2000 - children.t_first_mjd2000
-        late = np.flatnonzero(elapsed > _HOMEWARD_SHARE * problem.max_duration_days)
-        hopeless = late[~np.isfinite(self._days_home(children.take(late), end))]
-        children = children.take(np.setdiff1d(np.arange(len(children)), hopeless))
-        if len(children) == 0:
-            return children
-        return children.take(frontier.admit(children, here.beam_width))
+    def _homecomings(
+        self, ranks: "list[_Rank]", children: "_Children", ways: Ways, count: int
+    ) -> list[Homecoming]:
+        """Return the best ends of a rank of children, as tours."""
+        order = np.argsort(children.home, kind="stable")[: _LOOKED_AT * count]
+        order = order[children.home[order] <= self._limits[0]]
+        parent = children.parent[order]
+        kinds = ranks[-1].sets[parent] + self._keys[children.row[order]]
+        first = np.unique(kinds, return_index=True)[1]
+        return [
+            self._traced(ranks, children, int(order[k]), ways.end) for k in np.sort(first)[:count]
+        ]
 
-    def _homecomings(self, ranks: list[Nodes], end: int, count: int) -> list[Homecoming]:
-        """Return the best ends of the last rank, as tours."""
-        nodes = ranks[-1]
-        elapsed = nodes.t_ready_mjd2000 - nodes.t_first_mjd2000
-        rows = np.flatnonzero(elapsed > _HOMEWARD_SHARE * self._problem.max_duration_days)
-        if len(rows) == 0:
-            return []
-        days = self._days_home(nodes.take(rows), end)
-        order = np.argsort(elapsed[rows] + days, kind="stable")
-        sets: set[tuple[int, ...]] = set()
-        tours: list[Homecoming] = []
-        for k in order:
-            kind = tuple(sorted(nodes.visited[rows[k]].tolist()))
-            if not np.isfinite(days[k]) or len(tours) == count:
-                break
-            if kind not in sets:
-                sets.add(kind)
-                tours.append(_traced(ranks, int(rows[k]), end, float(days[k])))
-        return tours
-
-    def _days_home(self, nodes: Nodes, end: int) -> _Array:
-        """Return (n,) the shortest flight from each node to the end; inf where there is none."""
-        problem = self._problem
-        days = np.full(len(nodes), np.inf)
-        elapsed = nodes.t_ready_mjd2000 - nodes.t_first_mjd2000
-        left = np.minimum(problem.max_duration_days - elapsed, _LONGEST_DAYS)
-        rows = np.flatnonzero(left > _SHORTEST_DAYS)
-        if len(rows) == 0:
-            return days
-        here, n = nodes.take(rows), len(rows)
-        first = np.full(n, _SHORTEST_DAYS)
-        times = flight_times(first, left[rows], _FLIGHTS)
-        parent = np.repeat(np.arange(n), _FLIGHTS)
-        target = np.full(len(parent), end, dtype=np.intp)
-        ready = here.t_ready_mjd2000
-        hops = problem.hops(here, parent, target, ready[parent], times.ravel())
-        values = log_margin(self._quick, hops).reshape(n, _FLIGHTS)
-        known: NDArray[np.bool_] = np.asarray(np.isfinite(values).all(axis=1))
-        curves = MarginCurves.through(first, left[rows], np.where(known[:, None], values, -1.0))
-        shortest = curves.shortest(np.log1p(self._base.margin_reserve))
-        # Longer flights burn less.
-        stretches = np.array(_HOME_STRETCHES)
-        tof = np.minimum(np.where(known, shortest, np.inf)[:, None] * stretches, left[rows, None])
-        row, column = np.nonzero(np.isfinite(tof) & (tof >= shortest[:, None]))
-        flight = tof[row, column]
-        margin = np.exp(curves.take(row).log_margin(flight))
-        ways = problem.hops(here, row, target[: len(row)], ready[row], flight)
-        mass = bounded_final_mass(ways.legs[-1], margin)
-        enough = mass >= problem.spacecraft.m_dry
-        best = np.full(n, np.inf)
-        np.minimum.at(best, row[enough], flight[enough])
-        days[rows] = best
-        return days
-
-    def _width(self, nodes: Nodes, width: int) -> int:
-        elapsed = float((nodes.t_arr_mjd2000 - nodes.t_first_mjd2000).mean())
-        share = elapsed / self._problem.max_duration_days
-        factor = np.exp(np.interp(share, _ELAPSED, np.log(_WIDTHS)))
-        return max(1, round(width * float(factor)))
+    def _traced(
+        self, ranks: "list[_Rank]", children: "_Children", last: int, end: int
+    ) -> Homecoming:
+        """Return the tour that leads from the first rank to one of the children, and on."""
+        at = int(children.parent[last])
+        first_departure = float(ranks[-1].first_departure[at])
+        arrival = float(children.arrival[last])
+        departures = [arrival + self._problem.min_stay_days]
+        flights = [first_departure + float(children.home[last]) - departures[0]]
+        rows = [end, int(children.row[last])]
+        for rank in reversed(ranks):
+            departures.append(float(rank.ready[at]))
+            flights.append(arrival - departures[-1])
+            rows.append(int(rank.row[at]))
+            arrival, at = float(rank.arrival[at]), int(rank.parent[at])
+        itinerary = Itinerary(
+            self.chart.rows[np.array(rows[::-1])],
+            np.array(departures[::-1]),
+            np.array(flights[::-1]),
+        )
+        visits = ranks[0].depth + len(ranks)
+        return Homecoming(itinerary, visits, float(children.home[last]))
 
 
 @final
-class _HomingRanking:
-    """Scores by what is used up, and by how far the end will be; a `Ranking`."""
+@dataclass(frozen=True, eq=False)
+class _Children:
+    """What `expand` writes: m children, of which `home` is the duration if they go to the end."""
 
-    def __init__(self, end: int, settings: HomingSettings) -> None:
-        self._end = end
-        self._base = BalancedRanking(1.0, settings.propellant_weight)
-        self._weight = settings.distance_weight
-
-    def score(self, nodes: Nodes, problem: Problem, /) -> _Array:
-        """Return (n,) float64, smaller is better."""
-        t_end = nodes.t_first_mjd2000 + problem.max_duration_days
-        share = (nodes.t_arr_mjd2000 - nodes.t_first_mjd2000) / problem.max_duration_days
-        here = orbital_metric(problem.catalogue.states_at(nodes.row, t_end), 180.0)
-        rows = np.full(len(nodes), self._end)
-        there = orbital_metric(problem.catalogue.states_at(rows, t_end), 180.0)
-        distance = np.minimum(np.linalg.norm(here - there, axis=1) / _DISTANCE, _FARTHEST)
-        score: _Array = self._base.score(nodes, problem) + self._weight * share**2 * distance
-        return score
+    row: NDArray[np.int32]
+    parent: NDArray[np.int32]
+    arrival: _Array
+    mass: _Array
+    score: _Array
+    home: _Array
 
 
-def _traced(ranks: list[Nodes], last: int, end: int, days: float) -> Homecoming:
-    """Return the tour that leads from the first rank to a node of the last one, and on."""
-    leaf = ranks[-1]
-    rows = [end, int(leaf.row[last])]
-    departures, flights = [float(leaf.t_ready_mjd2000[last])], [days]
-    at = last
-    for before, after in zip(ranks[-2::-1], ranks[:0:-1], strict=True):
-        arrival, at = float(after.t_arr_mjd2000[at]), int(after.parent_id[at])
-        departures.append(float(before.t_ready_mjd2000[at]))
-        flights.append(arrival - departures[-1])
-        rows.append(int(before.row[at]))
-    itinerary = Itinerary(
-        np.array(rows[::-1], dtype=np.intp), np.array(departures[::-1]), np.array(flights[::-1])
-    )
-    duration = float(leaf.t_ready_mjd2000[last] + days - leaf.t_first_mjd2000[last])
-    return Homecoming(itinerary, int(leaf.depth[last]), duration)
+@final
+@dataclass(frozen=True, eq=False)
+class _Rank:
+    """Nodes of one depth; rows are positions in the chart.
 
+    Attributes
+    ----------
+    depth : int
+        Visits of the beam's first rank.
+    row, parent, start : (w,) int32
+        Where, of which node in the rank before, and of which start.
+    ready, arrival, first_departure : (w,) float64
+        Epochs in MJD2000.
+    mass : (w,) float64, kg
+        Mass.
+    sets : (w,) uint64
+        Sum of the keys of the bodies since the start.
+    own : (w, d) int32
+        Those bodies.
+    """
 
-def _numbered(nodes: Nodes) -> Nodes:
-    """Return nodes with ids of their own, by which their children know them."""
-    return replace(nodes, tree_id=np.arange(len(nodes), dtype=np.int64))
+    depth: int
+    row: NDArray[np.int32]
+    parent: NDArray[np.int32]
+    start: NDArray[np.int32]
+    ready: _Array
+    arrival: _Array
+    first_departure: _Array
+    mass: _Array
+    sets: NDArray[np.uint64]
+    own: NDArray[np.int32]
+
+    @classmethod
+    def first(cls, starts: Nodes, rows: _Index) -> "_Rank":
+        """Return the first rank."""
+        count = len(starts)
+        row = rows.astype(np.int32)
+        return cls(
+            depth=int(starts.depth[0]),
+            row=row,
+            parent=np.full(count, -1, dtype=np.int32),
+            start=np.arange(count, dtype=np.int32),
+            ready=starts.t_ready_mjd2000,
+            arrival=starts.t_arr_mjd2000,
+            first_departure=starts.t_first_mjd2000,
+            mass=starts.mass,
+            sets=np.zeros(count, dtype=np.uint64),
+            own=row[:, None],
+        )
+
+    def children(
+        self,
+        children: _Children,
+        taken: NDArray[np.int64],
+        keys: NDArray[np.uint64],
+        stay_days: float,
+    ) -> "_Rank":
+        """Return the rank of some children."""
+        parent, row = children.parent[taken], children.row[taken]
+        arrival = children.arrival[taken]
+        return _Rank(
+            depth=self.depth,
+            row=row,
+            parent=parent,
+            start=self.start[parent],
+            ready=arrival + stay_days,
+            arrival=arrival,
+            first_departure=self.first_departure[parent],
+            mass=children.mass[taken],
+            sets=self.sets[parent] + keys[row],
+            own=np.column_stack([self.own[parent], row]),
+        )

@@ -16,26 +16,19 @@ from scipy.optimize import minimize
 
 from feasibility import Legs
 from feasibility.classifier.predictor import LegPredictor
-from seqsearch.carriers.crew import MISSION_DAYS, TOUCH_DAYS, WAIT_DAYS, Crew, own_problem
-from seqsearch.carriers.flight import captures_of, carrier_of, releases_of
-from seqsearch.carriers.mother import change_orbit
+from seqsearch.carriers.crew import TOUCH_DAYS, Crew, own_problem
+from seqsearch.carriers.crew_schedule import schedule_of
+from seqsearch.carriers.flight import carrier_of
 from seqsearch.carriers.plans import Screen
 from seqsearch.carriers.schedule import Act, Outing, Schedule, Step
 from seqsearch.polish.flight import Flight
 from seqsearch.polish.retiming import retime
 from seqsearch.problems.rendezvous import RendezvousProblem
-from seqsearch.tours.carrier.path import mass_after
-from seqsearch.tours.carrier.records import CarrierImpulse
 
 _Array = NDArray[np.float64]
 
 LEAD_DAYS: Final = 3.0
 """Least time between an impulse and a release or capture: retiming shifts them a little."""
-
-_FIRST_LEAD_DAYS: Final = 12.0
-
-_RESERVE_DAYS: Final = 15.0
-"""By how much retiming may shift the release of a probe that stays at last for all its time."""
 
 _SPARE_KG: Final = 0.5
 """Propellant of hers that is left, as probes come back some grams heavier or lighter."""
@@ -47,7 +40,7 @@ _LARGEST_M_S: Final = 700.0
 _STEPS: Final = 80
 _DIFFERENCE: Final = 1e-4
 _ROUNDS: Final = 4
-_ITERATIONS: Final = 30
+_ITERATIONS: Final = 20
 _WORTH_DAYS: Final = 0.5
 """Days that all probes together have to gain for another round."""
 
@@ -103,8 +96,8 @@ def joined_crew(
         Draws what is asked for: which probe matters most, what propellant is worth, where the
         optimiser begins.
     """
-    count = len(crew.flights)
-    wishes = Wishes(tuple(rng.uniform(0.5, 1.5, count)), float(rng.uniform(0.1, 1.5)))
+    weights = tuple(float(weight) for weight in 0.2 + rng.exponential(1.0, len(crew.flights)))
+    wishes = Wishes(weights, float(rng.uniform(0.1, 1.5)))
     stirred = float(rng.choice([0.3, 1.0, 2.0]))
     return joined(screen, problem, crew, wishes, rng=rng, stirred=stirred)
 
@@ -159,7 +152,7 @@ def _once(
     schedule = schedule_of(screen, crew)
     if schedule is None:
         return None
-    ends = _ends(problem, crew, schedule)
+    ends = _ends(crew, schedule)
     if not ends:
         return None
     program = _Program(schedule, ends, problem, screen.predictor, wishes)
@@ -170,126 +163,7 @@ def _once(
     return _retimed(screen, problem, crew, schedule, x, stays)
 
 
-def schedule_of(screen: Screen, crew: Crew) -> Schedule | None:
-    """Return what the mother ship of a crew may do; None where she cannot fly as it is.
-
-    Up to the release of the probe that stays at the first orbit's asteroid she is there, and at
-    the capture of the one that stays at the second's. Before each other release and capture there
-    is an impulse.
-    """
-    route = screen.route(crew.plan)
-    carrier = carrier_of(screen, crew)
-    if route is None or carrier is None:
-        return None
-    impulses = list(carrier.impulses[2:])
-    count = len(crew.flights)
-    releases = sorted(zip(releases_of(crew), range(count), strict=True))
-    captures = sorted(zip(captures_of(crew), range(count), strict=True))
-    stays = crew.waits() if crew.course is None else crew.course.stays
-    steps = (
-        _steps_again(crew, releases, captures, impulses)
-        if crew.course is not None
-        else _steps(releases, captures, stays, impulses)
-    )
-    rules = screen.rules
-    if stays[1] is not None:
-        steps = _with_late_capture(
-            steps, crew, stays[1], carrier.launch.t_mjd2000 + rules.max_duration_days
-        )
-    return Schedule(
-        steps,
-        screen.catalogue,
-        crew.plan.first,
-        crew.plan.second,
-        rules,
-        mass_after(rules, rules.m0_kg, route.delta_v),
-        [float(flight.mass[-1]) for flight in crew.flights],
-    )
-
-
-_Epochs = list[tuple[float, int]]
-
-
-def _steps(
-    releases: _Epochs,
-    captures: _Epochs,
-    stays: tuple[int | None, int | None],
-    change: list[CarrierImpulse],
-) -> list[Step]:
-    """Return the steps of a mother ship that changes her orbit once so far."""
-    leave, arrive = change
-    order = [number for _, number in captures]
-    before = 0 if stays[1] is None else order.index(stays[1])
-    steps: list[Step] = []
-    kept = -1 if stays[0] is None else [number for _, number in releases].index(stays[0])
-    for k, (epoch, number) in enumerate(releases):
-        if k > kept:
-            steps.append(Step(Act.IMPULSE, epoch - _FIRST_LEAD_DAYS))
-        steps.append(Step(Act.RELEASE, epoch, number, free=k > kept, stays=k == kept))
-    if before == 0:
-        steps.append(Step(Act.DEPART, leave.t_mjd2000))
-        steps.append(Step(Act.ARRIVE, arrive.t_mjd2000))
-    else:
-        steps.append(Step(Act.IMPULSE, leave.t_mjd2000, dv_m_s=leave.dv_m_s))
-    for k, (epoch, number) in enumerate(captures):
-        if k == before and k > 0:
-            earlier = captures[k - 1][0]
-            steps.append(Step(Act.DEPART, earlier + 0.1 * (epoch - earlier)))
-            steps.append(Step(Act.ARRIVE, earlier + 0.9 * (epoch - earlier)))
-        rests = number == stays[1]
-        if k == 0 and before > 0:
-            steps.append(Step(Act.IMPULSE, arrive.t_mjd2000, dv_m_s=arrive.dv_m_s))
-        elif not rests:
-            steps.append(Step(Act.IMPULSE, epoch - _FIRST_LEAD_DAYS))
-        steps.append(Step(Act.CAPTURE, epoch, number, stays=rests))
-    return steps
-
-
-def _steps_again(
-    crew: Crew, releases: _Epochs, captures: _Epochs, impulses: list[CarrierImpulse]
-) -> list[Step]:
-    """Return the steps of a mother ship that is on a course already."""
-    course = crew.course
-    assert course is not None
-    events = [
-        *[(epoch, Act.RELEASE, number) for epoch, number in releases],
-        *[(epoch, Act.CAPTURE, number) for epoch, number in captures],
-    ]
-    steps = []
-    for epoch, act, number in events:
-        away = act is Act.CAPTURE or course.starts[number] > 0
-        stays = number == course.stays[0 if act is Act.RELEASE else 1]
-        steps.append(Step(act, epoch, number, free=away, stays=stays))
-    for k, impulse in enumerate(impulses, 1):
-        if k == course.settled - 1:
-            steps.append(Step(Act.DEPART, impulse.t_mjd2000))
-        elif k == course.settled:
-            steps.append(Step(Act.ARRIVE, impulse.t_mjd2000))
-        else:
-            steps.append(Step(Act.IMPULSE, impulse.t_mjd2000, dv_m_s=impulse.dv_m_s))
-    return sorted(steps, key=lambda step: step.t_mjd2000)
-
-
-def _with_late_capture(
-    steps: list[Step], crew: Crew, number: int, end_mjd2000: float
-) -> list[Step]:
-    """Return the steps with the range of when the probe is caught that stays at last.
-
-    It may stay for all of the time that it has left.
-    """
-    released = next(step for step in steps if step.probe == number and step.act is Act.RELEASE)
-    reserve = _RESERVE_DAYS if released.free and not released.stays else TOUCH_DAYS
-    latest = released.t_mjd2000 + MISSION_DAYS - reserve
-    earliest = float(crew.flights[number].itinerary.t_arr_mjd2000[-1]) + WAIT_DAYS
-    return [
-        replace(step, range_mjd2000=(earliest, max(earliest, min(latest, end_mjd2000))))
-        if step.probe == number and step.act is Act.CAPTURE
-        else step
-        for step in steps
-    ]
-
-
-def _ends(problem: RendezvousProblem, crew: Crew, schedule: Schedule) -> list[_End]:
+def _ends(crew: Crew, schedule: Schedule) -> list[_End]:
     """Return the legs that the schedule may change."""
     ends = []
     for k, step in enumerate(schedule.steps):
@@ -330,9 +204,7 @@ class _Program:
         self._schedule, self._ends = schedule, ends
         self._predictor, self._wishes = predictor, wishes
         self._craft = problem.spacecraft
-        self._goals = [
-            problem.catalogue.states_at([end.row], end.t_mjd2000)[0] for end in ends
-        ]
+        self._goals = [problem.catalogue.states_at([end.row], end.t_mjd2000)[0] for end in ends]
         self._offsets = np.zeros(len(ends))
         steps = schedule.steps
         self._gaps = np.array([_gap(a, b) for a, b in pairwise(steps)])
@@ -365,7 +237,8 @@ class _Program:
         return x if holds else None
 
     def _at(self, x: _Array) -> _Array:
-        return self._values(x[None])[0]
+        values: _Array = self._values(x[None])[0]
+        return values
 
     def _slopes(self, x: _Array) -> _Array:
         """Return (k, c) the change of each value with each number."""
@@ -376,7 +249,7 @@ class _Program:
         return self._memory[1]
 
     def _values(self, x: _Array) -> _Array:
-        """Return (m, c): days gained; then what must not be negative: propellant, gaps, margins."""
+        """Return (m, c): days gained; then what must not be negative."""
         outing = self._schedule.fly(x)
         margins, masses = self._margins(outing)
         gained = np.zeros(len(x))
@@ -433,7 +306,7 @@ def _retimed(
     x: _Array,
     stays: tuple[int | None, int | None],
 ) -> Crew | None:
-    """Return the crew on a schedule's course, its tours retimed; None where one cannot be flown."""
+    """Return the crew on a schedule's course, its tours retimed; None where one fails."""
     trial = replace(crew, course=schedule.course(x, stays))
     epochs = schedule.epochs(x[None])[0]
     flights = list(crew.flights)
@@ -445,7 +318,9 @@ def _retimed(
         ]
         if not changed:
             continue
-        found = _retimed_probe(problem, trial, number, flight, [(epochs[k], s) for k, s in changed])
+        found = _retimed_probe(
+            problem, trial, number, flight, [(epochs[k], s) for k, s in changed]
+        )
         if found is None:
             return None
         flights[number] = found

@@ -1,44 +1,82 @@
-"""`LegChart`: what the classifier says of all legs between near bodies, at all epochs.
+"""`LegChart`: what a classifier says of all legs between near bodies, at all epochs.
 
 m* does not depend on the mass at departure. So the curve of log(m*) over the flight time, for a
-pair of bodies and a departure, serves spacecraft of any mass, and beams that look everything up are
-hundreds of times as fast as those that ask the classifier.
+pair of bodies and a departure, serves spacecraft of any mass, and beams that look everything up
+are hundreds of times as fast as those that ask the classifier.
 """
 
 from dataclasses import dataclass
-from typing import Final, final
+from typing import Final, Self, final
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from feasibility import Legs
-from feasibility.classifier.predictor import LegPredictor, QuickPredictor
-from feasibility.constants import DAY_S
+from feasibility.classifier.predictor import LegPredictor
+from feasibility.legs import Spacecraft
 from feasibility.orbits import Catalogue
 from feasibility.orbits.lambert import lambert_delta_v
 from feasibility.orbits.neighbours import orbital_metric
-from feasibility.legs import Spacecraft
+from seqsearch.carriers.chart_kernels import LOG_MASS_LOW, LOG_MASS_UNIT, SPEED_UNIT
+from seqsearch.core.hop_margins import quick_margin_of
 
 _Array = NDArray[np.float64]
-_Floats = NDArray[np.float32]
+_Codes = NDArray[np.uint16]
 _Rows = NDArray[np.int32]
+_Index = NDArray[np.intp]
 
 TOF_DAYS: Final = np.array([70.0, 100.0, 140.0, 185.0, 240.0])
 HOME_TOF_DAYS: Final = np.array([50.0, 80.0, 120.0, 180.0, 270.0, 400.0])
-"""Flight times between which curves are linear."""
+"""Flight times between which curves are linear: of all legs, and of those to the end."""
 
 STEP_DAYS: Final = 80.0
-_ASKED: Final = 3
-"""Position of the flight time that is asked about first."""
+"""Length of the intervals of departures."""
 
 _NEIGHBOURS: Final = 24
 _METRIC_DAYS: Final = 150.0
 _FARTHEST: Final = 4500.0
-"""m/s of the metric."""
+"""Neighbours that are asked about: how many, in which metric, and m/s of it."""
 
-_HOME_FARTHEST: Final = 6500.0
-_HOME_MOST: Final = 200
+_ASKED: Final = 3
+_HEAVY_ENOUGH: Final = 1.2
+"""A pair is on the chart if m* is that many dry masses at one of the flight times."""
+
+_HOME_METRIC_DAYS: Final = 180.0
+_HOME_FARTHEST: Final = 5500.0
+_HOME_MOST: Final = 120
+"""Bodies from which there may be a way to an end."""
+
+_MAX_CODE: Final = 65535
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Ways:
+    """Legs to one body.
+
+    With k intervals, n bodies of the chart, h curves and q flight times.
+
+    Attributes
+    ----------
+    end : int
+        The body, as a position in the chart.
+    first : int
+        The first interval.
+    index : (k, n) int32
+        Which curve a body has in an interval; -1 for none.
+    m_star, delta_v : (h, 2, q) uint16
+        As those of `LegChart`.
+    log_tof : (q,) float64
+        Logarithms of the flight times in days.
+    """
+
+    end: int
+    first: int
+    index: _Rows
+    m_star: _Codes
+    delta_v: _Codes
+    log_tof: _Array
 
 
 @final
@@ -46,54 +84,119 @@ _HOME_MOST: Final = 200
 class LegChart:
     """Legs between n bodies.
 
-    With k intervals of departure epochs, p pairs and q flight times.
+    With k intervals of departures, p pairs and q flight times.
 
     Attributes
     ----------
     rows : (n,) intp
-        Catalogue rows.
+        Catalogue rows, ascending.
     t0_mjd2000 : float
         Where the first interval begins; each is `STEP_DAYS` long.
     offsets : (k n + 1,) int64
         Pairs of body i in interval j are those from entry j n + i on.
     target : (p,) int32
         Where they lead, as positions in `rows`.
-    log_m_star : (p, 2, q) float32
-        log(m*/kg) at both ends of the interval.
-    delta_v : (p, 2, q) float32, m/s
-        Of Lambert arcs.
+    m_star, delta_v : (p, 2, q) uint16
+        log(m*/kg) and the velocity changes of Lambert arcs, at both ends of the interval and at
+        `TOF_DAYS`, in the units of `chart_kernels`.
     points : (k + 1, n, 6) float32, m/s
         The orbital metric at the ends of all intervals.
+    source : (p,) int32
+        From which entry of `offsets` a pair comes.
+    to : (p,) int32
+        Pairs in the order of their targets.
+    to_offsets : (n + 1,) int64
+        Pairs to body i are those from entry i of `to` on.
     """
 
-    rows: NDArray[np.intp]
+    rows: _Index
     t0_mjd2000: float
     offsets: NDArray[np.int64]
     target: _Rows
-    log_m_star: _Floats
-    delta_v: _Floats
-    points: _Floats
+    m_star: _Codes
+    delta_v: _Codes
+    points: NDArray[np.float32]
+    source: _Rows
+    to: _Rows
+    to_offsets: NDArray[np.int64]
+
+    @classmethod
+    def of_parts(cls, rows: _Index, t0_mjd2000: float, parts: "list[ChartPart]") -> Self:
+        """Return the chart of all intervals, in order; the last one adds its points alone."""
+        inner = parts[:-1]
+        counts = np.concatenate([part.counts for part in inner])
+        target = np.concatenate([part.target for part in inner])
+        to = np.argsort(target, kind="stable").astype(np.int32)
+        return cls(
+            rows=rows,
+            t0_mjd2000=t0_mjd2000,
+            offsets=np.concatenate([[0], np.cumsum(counts)]),
+            target=target,
+            m_star=np.concatenate([part.m_star for part in inner]),
+            delta_v=np.concatenate([part.delta_v for part in inner]),
+            points=np.array([part.points for part in parts]),
+            source=np.repeat(np.arange(len(counts), dtype=np.int32), counts),
+            to=to,
+            to_offsets=np.searchsorted(target[to], np.arange(len(rows) + 1)),
+        )
 
     @property
     def intervals(self) -> int:
-        """How many intervals of departure epochs there are."""
+        """How many intervals of departures there are."""
         return len(self.points) - 1
+
+    def interval(self, t_mjd2000: float) -> int:
+        """Return in which interval an epoch lies, the first or last one if in none."""
+        k = int((t_mjd2000 - self.t0_mjd2000) // STEP_DAYS)
+        return min(max(k, 0), self.intervals - 1)
+
+    def positions(self, rows: _Index) -> _Index:
+        """Return positions of catalogue rows; those that are not on the chart are left out."""
+        at = np.minimum(np.searchsorted(self.rows, rows), len(self.rows) - 1)
+        found: _Index = at[self.rows[at] == rows]
+        return found
+
+    def ways(self, end: int, first: int, last: int) -> Ways:
+        """Return the legs to a body in intervals from `first` up to `last`."""
+        n = len(self.rows)
+        pairs = self.to[self.to_offsets[end] : self.to_offsets[end + 1]]
+        interval, body = np.divmod(self.source[pairs], n)
+        inside = (interval >= first) & (interval <= last)
+        pairs = pairs[inside]
+        index = np.full((last - first + 1, n), -1, dtype=np.int32)
+        index[interval[inside] - first, body[inside]] = np.arange(len(pairs))
+        curves = np.asarray(self.m_star[pairs]), np.asarray(self.delta_v[pairs])
+        return Ways(end, first, index, *curves, np.log(TOF_DAYS))
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class ChartPart:
+    """One interval of a chart; see there."""
+
+    counts: NDArray[np.int64]
+    target: _Rows
+    m_star: _Codes
+    delta_v: _Codes
+    points: NDArray[np.float32]
 
 
 @final
 class ChartMaker:
-    """Makes charts.
+    """Asks a predictor about all legs of a chart.
 
     Parameters
     ----------
     catalogue : Catalogue
         All bodies.
     rows : (n,) intp
-        Those of the chart.
+        Those of the chart, ascending.
     spacecraft : Spacecraft
-        Its engine counts, and its masses roughly.
+        Its engine counts.
+    m0 : float, kg
+        Its first mass.
     predictor : LegPredictor
-        Asked for margins.
+        Is asked; a `QuickPredictor` for quick answers.
     t0_mjd2000 : float
         Where the first interval begins.
     """
@@ -101,72 +204,43 @@ class ChartMaker:
     def __init__(
         self,
         catalogue: Catalogue,
-        rows: NDArray[np.intp],
+        rows: _Index,
         spacecraft: Spacecraft,
+        m0: float,
         predictor: LegPredictor,
         t0_mjd2000: float,
-        m0: float,
     ) -> None:
-        self._catalogue, self._rows = catalogue, rows
-        self._craft, self._predictor = spacecraft, predictor
+        self._catalogue, self._rows, self._craft = catalogue, rows, spacecraft
+        self._ask = quick_margin_of(predictor)
         self._t0 = t0_mjd2000
+        # Margins are best known for masses that legs have.
         self._mass = float(np.sqrt(m0 * spacecraft.m_dry))
 
-    def points(self, k: int) -> _Floats:
-        """Return (n, 6) the metric at the beginning of an interval."""
-        states = self._catalogue.states_at(self._rows, self._t0 + k * STEP_DAYS)
-        return orbital_metric(states, _METRIC_DAYS).astype(np.float32)
-
-    def interval(self, k: int) -> tuple[NDArray[np.int64], _Rows, _Floats, _Floats]:
-        """Return how many pairs each body has in an interval, where they lead, and both curves."""
+    def part(self, k: int) -> ChartPart:
+        """Return an interval."""
         begin = self._t0 + k * STEP_DAYS
-        middle = self._catalogue.states_at(self._rows, begin + 0.5 * STEP_DAYS)
-        points = orbital_metric(middle, _METRIC_DAYS)
-        n = len(points)
-        distance, near = cKDTree(points).query(points, k=_NEIGHBOURS + 1, distance_upper_bound=_FARTHEST)
+        middle = self._points(begin + 0.5 * STEP_DAYS, _METRIC_DAYS)
+        count = min(_NEIGHBOURS + 1, len(middle))
+        distance, near = cKDTree(middle).query(middle, count, distance_upper_bound=_FARTHEST)
         source, column = np.nonzero(np.isfinite(distance))
         target = near[source, column]
         different = source != target
         source, target = source[different], target[different]
-        within = np.log(self._craft.m_dry)
-        asked, _ = self._ask(source, target, begin + 0.5 * STEP_DAYS, float(TOF_DAYS[_ASKED]))
-        good = asked >= within
-        source, target = source[good], target[good]
-        values = [
-            [self._ask(source, target, epoch, float(tof)) for tof in TOF_DAYS]
-            for epoch in (begin, begin + STEP_DAYS)
-        ]
-        table = np.array(values, dtype=np.float32)  # (2, q, 2, p)
-        counts = np.bincount(source, minlength=n).astype(np.int64)
-        curves = table.transpose(2, 3, 0, 1)
-        return counts, target.astype(np.int32), curves[0].copy(), curves[1].copy()
+        codes, _ = self._codes(source, target, begin + 0.5 * STEP_DAYS, TOF_DAYS[_ASKED])
+        enough = (np.log(_HEAVY_ENOUGH * self._craft.m_dry) - LOG_MASS_LOW) / LOG_MASS_UNIT
+        source, target = source[codes >= enough], target[codes >= enough]
+        curves = self._curves(source, target, begin, TOF_DAYS)
+        counts = np.bincount(source, minlength=len(middle)).astype(np.int64)
+        points = self._points(begin, _METRIC_DAYS).astype(np.float32)
+        return ChartPart(counts, target.astype(np.int32), *curves, points)
 
-    def home(
-        self, end: int, first: int, last: int
-    ) -> tuple[NDArray[np.int32], _Floats, _Floats]:
-        """Return the legs to one body.
-
-        Parameters
-        ----------
-        end : int
-            Position in the chart's bodies.
-        first, last : int
-            Intervals, the last one excluded.
-
-        Returns
-        -------
-        index : (last - first, n) int32
-            Which curve a body has; -1 for none.
-        log_m_star, delta_v : (h, 2, q) float32
-            The curves, over `HOME_TOF_DAYS`.
-        """
-        n = len(self._rows)
-        index = np.full((last - first, n), -1, dtype=np.int32)
-        sources, epochs = [], []
-        count = 0
-        for k in range(first, last):
+    def ways(self, end: int, first: int, last: int) -> Ways:
+        """Return the legs to a body in intervals from `first` up to `last`, also long ones."""
+        index = np.full((last - first + 1, len(self._rows)), -1, dtype=np.int32)
+        sources, epochs, count = [], [], 0
+        for k in range(first, last + 1):
             begin = self._t0 + k * STEP_DAYS
-            points = orbital_metric(self._catalogue.states_at(self._rows, begin + 0.5 * STEP_DAYS), 180.0)
+            points = self._points(begin + 0.5 * STEP_DAYS, _HOME_METRIC_DAYS)
             distance = np.linalg.norm(points - points[end], axis=1)
             near = np.argsort(distance, kind="stable")[1 : _HOME_MOST + 1]
             near = near[distance[near] < _HOME_FARTHEST]
@@ -174,30 +248,49 @@ class ChartMaker:
             count += len(near)
             sources.append(near)
             epochs.append(np.full(len(near), begin))
-        source, epoch = np.concatenate(sources), np.concatenate(epochs)
+        source = np.concatenate(sources)
         target = np.full(len(source), end)
-        values = [
-            [self._ask(source, target, at, float(tof)) for tof in HOME_TOF_DAYS]
-            for at in (epoch, epoch + STEP_DAYS)
-        ]
-        table = np.array(values, dtype=np.float32).transpose(2, 3, 0, 1)
-        return index, table[0].copy(), table[1].copy()
+        curves = self._curves(source, target, np.concatenate(epochs), HOME_TOF_DAYS)
+        return Ways(end, first, index, *curves, np.log(HOME_TOF_DAYS))
 
-    def _ask(
-        self, source: NDArray[np.intp], target: NDArray[np.intp], t_dep: _Array | float, tof: float
-    ) -> tuple[_Array, _Array]:
-        """Return log(m*), and the velocity changes of Lambert arcs."""
+    def _points(self, t_mjd2000: float, days: float) -> _Array:
+        return orbital_metric(self._catalogue.states_at(self._rows, t_mjd2000), days)
+
+    def _curves(
+        self, source: _Index, target: _Index, begin: _Array | float, tof_days: _Array
+    ) -> tuple[_Codes, _Codes]:
+        """Return two (p, 2, q) curves, at both ends of an interval."""
+        m_star = np.empty((len(source), 2, len(tof_days)), dtype=np.uint16)
+        delta_v = np.empty_like(m_star)
+        for side in range(2):
+            for q, tof in enumerate(tof_days):
+                departure = begin + side * STEP_DAYS
+                m_star[:, side, q], delta_v[:, side, q] = self._codes(
+                    source, target, departure, tof
+                )
+        return m_star, delta_v
+
+    def _codes(
+        self, source: _Index, target: _Index, t_dep: _Array | float, tof: float
+    ) -> tuple[_Codes, _Codes]:
+        """Return log(m*) and velocity changes of Lambert arcs as codes."""
         rows, craft = self._rows, self._craft
         legs = Legs(
             rv_dep=self._catalogue.states_at(rows[source], t_dep),
-            rv_arr=self._catalogue.states_at(rows[target], np.asarray(t_dep) + tof),
+            rv_arr=self._catalogue.states_at(rows[target], t_dep + tof),
             tof_days=tof,
             m0=self._mass,
             thrust=craft.thrust,
             isp=craft.isp,
             m_dry=craft.m_dry,
         )
-        quick = isinstance(self._predictor, QuickPredictor)
-        margin = self._predictor.quick_margin(legs) if quick else self._predictor.margin(legs)
-        delta_v = lambert_delta_v(legs.rv_dep, legs.rv_arr, legs.tof_s, 0)
-        return np.log(self._mass * margin), delta_v
+        log_m_star = np.log(self._mass * np.maximum(self._ask(legs), 1e-9))
+        mass = (np.nan_to_num(log_m_star) - LOG_MASS_LOW) / LOG_MASS_UNIT
+        speed = (
+            np.nan_to_num(lambert_delta_v(legs.rv_dep, legs.rv_arr, legs.tof_s, 0)) / SPEED_UNIT
+        )
+        return _coded(mass), _coded(speed)
+
+
+def _coded(values: _Array) -> _Codes:
+    return np.clip(np.rint(values), 0, _MAX_CODE).astype(np.uint16)

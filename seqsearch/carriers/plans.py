@@ -1,21 +1,24 @@
 """`Plan`: which two orbits a mother ship uses and when; and how plans are screened.
 
-All asteroids with near neighbours whose orbits she can get to are looked at: `Screen.rate` runs
-narrow beams from each and back to it, `Screen.seconds` looks for the best second orbit.
+All asteroids whose orbits she can get to are looked at: `Screen.candidates` are plans that keep to
+one of them, `Screen.continued` those that go on to a second one, `Screen.valued` runs beams for
+all probes of a plan.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Final, final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from feasibility.classifier.predictor import LegPredictor
-from feasibility.constants import AU, YEAR_DAYS
+from feasibility.constants import AU
 from feasibility.orbits import Catalogue
-from feasibility.orbits.neighbours import orbital_metric
+from seqsearch.carriers.chart_files import read_chart
 from seqsearch.carriers.homing import Homecoming, Homing, HomingSettings
+from seqsearch.carriers.leg_chart import STEP_DAYS, ChartMaker, ChartPart, LegChart
 from seqsearch.carriers.mother import later_budget, next_orbits
 from seqsearch.carriers.routes import Route, Routes, refined_route, scan_routes
 from seqsearch.core.nodes import Nodes
@@ -26,15 +29,15 @@ from seqsearch.tours.carrier.records import CarrierRules
 _Array = NDArray[np.float64]
 _Index = NDArray[np.intp]
 
-SPREAD_DAYS: Final = 700.0
+SPREAD_DAYS: Final = 900.0
 """Time within which all probes are released; the rest is for the change of orbit."""
 
 STAY_DAYS: Final = 30.0
 
-OVERTIME_DAYS: Final = 80.0
-"""By how much predicted tours may be too long: retiming shortens them."""
+OVERTIME_DAYS: Final = 110.0
+"""By how much predicted tours may be too long: retiming makes them 50 to 120 days shorter."""
 
-_RELEASES_DAYS: Final = 60.0
+RELEASES_DAYS: Final = 30.0
 """Step of the release epochs that are tried."""
 
 _LAUNCH_STEP_DAYS: Final = 40.0
@@ -45,19 +48,12 @@ _SCAN_DELTA_V: Final = 6400.0
 _LONGEST_DAYS: Final = 1000.0
 """Longest way to the first orbit."""
 
-_CROWD_DAYS: Final = 150.0
-_CROWD_SPEED: Final = 2500.0
-_CROWD_STEP_DAYS: Final = 240.0
-"""Metric, distance in m/s and step of the epochs at which neighbours are counted."""
-
-_MOST_SECONDS: Final = 30
+_MOST_SECONDS: Final = 60
 """Second orbits that are rated for a plan."""
 
-_SPARE_BODIES: Final = 3
-"""Bodies for which routes are looked for, for each that is wanted."""
-
 _ELEMENTS: Final = (3.0, 0.25, np.radians(10.0))
-"""Largest a in AU, e and i of orbits that are looked at."""
+_CHART_ELEMENTS: Final = (3.05, 0.3, np.radians(12.0))
+"""Largest a in AU, e and i of orbits that she uses, and of bodies that probes visit."""
 
 _WAIT_DAYS: Final = STAY_DAYS + 1.0
 
@@ -74,7 +70,7 @@ class Plan:
     window_mjd2000 : float
         Earliest departure of a probe to its first asteroid; the latest is `SPREAD_DAYS` later.
     value : float
-        Predicted visits of one probe, and the share of a visit for which time is left.
+        Predicted visits of a probe, and the share of a visit for which time is left.
     """
 
     first: int
@@ -85,7 +81,7 @@ class Plan:
     def epochs(self, offset_days: float = 0.0) -> _Array:
         """Return the departures that are tried, the first some days after the beginning."""
         end = self.window_mjd2000 + SPREAD_DAYS
-        return np.arange(self.window_mjd2000 + offset_days, end, _RELEASES_DAYS)
+        return np.arange(self.window_mjd2000 + offset_days, end, RELEASES_DAYS)
 
     def same(self, other: "Plan") -> bool:
         """Tell whether another plan has the same orbits."""
@@ -105,7 +101,11 @@ class Screen:
     predictor : LegPredictor
         Predicts the probes' legs.
     settings : SearchSettings
-        Of the beams.
+        Of the search; its reserve counts.
+    chart_folder : Path
+        Where the chart is, or will be, from which all legs are looked up.
+    launch_mjd2000 : tuple of float, optional
+        Launches that are looked at; default: all that are allowed.
     """
 
     def __init__(
@@ -114,35 +114,90 @@ class Screen:
         rules: CarrierRules,
         predictor: LegPredictor,
         settings: SearchSettings,
+        chart_folder: Path,
+        launch_mjd2000: tuple[float, float] | None = None,
     ) -> None:
         self.catalogue: Catalogue = problem.catalogue
         self.rules = rules
         self.predictor = predictor
+        self.chart_folder = chart_folder
+        self.launch_mjd2000 = launch_mjd2000 or rules.launch_mjd2000
         self._routes: dict[tuple[int, float], Route | None] = {}
+        self._homing: Homing | None = None
+        self._reserve = settings.margin_reserve
         self.duration_days = problem.max_duration_days
-        longer = replace(problem, max_duration_days=problem.max_duration_days + OVERTIME_DAYS)
-        self.homing = Homing(longer, predictor, settings)
+        self._longer = replace(
+            problem, max_duration_days=problem.max_duration_days + OVERTIME_DAYS
+        )
         self._m0 = problem.m0
 
-    def crowded(self, count: int) -> _Index:
-        """Return rows of bodies that she can get to, most neighbours first."""
+    def __getstate__(self) -> dict[str, object]:
+        """Leave the chart behind: it is in its folder."""
+        return {**self.__dict__, "_homing": None}
+
+    @property
+    def homing(self) -> Homing:
+        """Beams over the chart, which has to be there.
+
+        Raises
+        ------
+        InputError
+            There is no chart, or it is damaged.
+        """
+        if self._homing is None:
+            chart = read_chart(self.chart_folder)
+            maker = self._maker(chart.rows, chart.t0_mjd2000)
+            self._homing = Homing(chart, maker, self._longer, self._reserve)
+        return self._homing
+
+    def chart_intervals(self) -> int:
+        """Return how many intervals the chart has: from first arrivals to last captures."""
+        begin, last = self._chart_begin(), self.launch_mjd2000[1] + self.rules.max_duration_days
+        return int(np.ceil((last - begin) / STEP_DAYS))
+
+    def chart_part(self, k: int) -> ChartPart:
+        """Return one interval of the chart."""
+        return self._maker(self._chart_rows(), self._chart_begin()).part(k)
+
+    def chart(self, parts: list[ChartPart]) -> LegChart:
+        """Return the chart of all its intervals, and one more."""
+        return LegChart.of_parts(self._chart_rows(), self._chart_begin(), parts)
+
+    def _maker(self, rows: _Index, begin: float) -> ChartMaker:
+        craft = self._longer.spacecraft
+        return ChartMaker(self.catalogue, rows, craft, self._m0, self.predictor, begin)
+
+    def _chart_begin(self) -> float:
+        return self.launch_mjd2000[0] + float(_TOFS_DAYS[0]) + _WAIT_DAYS
+
+    def _chart_rows(self) -> _Index:
+        return self._below(_CHART_ELEMENTS)
+
+    def _below(self, limits: tuple[float, float, float]) -> _Index:
         a, e, i = self.catalogue.elements[:, :3].T
-        limits = np.array(_ELEMENTS) * (AU, 1.0, 1.0)
-        rows = np.flatnonzero((a < limits[0]) & (e < limits[1]) & (i < limits[2]))
-        first, last = self.rules.launch_mjd2000
-        epochs = np.arange(first + YEAR_DAYS, last + 11 * YEAR_DAYS, _CROWD_STEP_DAYS)
-        counts = np.zeros(len(rows))
-        for epoch in epochs:
-            points = orbital_metric(self.catalogue.states(float(epoch)), _CROWD_DAYS)
-            near = cKDTree(points).query_ball_point(points[rows], _CROWD_SPEED, return_length=True)
-            counts += np.asarray(near, dtype=np.float64)
-        rows = rows[np.argsort(-counts, kind="stable")[: _SPARE_BODIES * count]]
-        within = np.isin(rows, self.routes(rows).row)
-        return rows[within][:count]
+        return np.flatnonzero((a < limits[0] * AU) & (e < limits[1]) & (i < limits[2]))
+
+    def candidates(self, offset: float) -> list[Plan]:
+        """Return plans that keep to one orbit, for all bodies and windows, unrated.
+
+        Parameters
+        ----------
+        offset : float
+            By what share of half a window all windows are moved.
+        """
+        routes = self.routes(self._below(_ELEMENTS))
+        order = np.argsort(routes.row, kind="stable")
+        bodies, begins = np.unique(routes.row[order], return_index=True)
+        parts = np.split(order, begins[1:])
+        return [
+            Plan(int(row), int(row), float(window), 0.0)
+            for row, part in zip(bodies, parts, strict=True)
+            for window in self.windows(routes.take(part), offset)
+        ]
 
     def routes(self, rows: _Index) -> Routes:
         """Return direct routes to bodies, cheap enough to be moved to within the budget."""
-        first, last = self.rules.launch_mjd2000
+        first, last = self.launch_mjd2000
         return scan_routes(
             self.catalogue,
             rows,
@@ -166,12 +221,6 @@ class Screen:
         inside = (steps[:, None] >= arrivals) & (steps[:, None] <= latest)
         return steps[inside.any(axis=1)]
 
-    def rate(self, row: int, width: int, offset: float = 0.0) -> list[Plan]:
-        """Return plans that keep to one orbit, one a window."""
-        windows = self.windows(self.routes(np.array([row])), offset)
-        plans = [self.valued(Plan(row, row, float(window), 0.0), width) for window in windows]
-        return [plan for plan in plans if plan.value > 0.0]
-
     def continued(self, plan: Plan) -> list[Plan]:
         """Return plans with the second orbits that she can go on to, cheapest first, unrated."""
         route = self.route(plan)
@@ -185,17 +234,27 @@ class Screen:
         )
         return [replace(plan, second=int(row), value=0.0) for row in rows[:_MOST_SECONDS]]
 
-    def valued(self, plan: Plan, width: int) -> Plan:
-        """Return a plan with its value: that of its best predicted tour; 0 for none."""
-        tours = self.tours(plan, HomingSettings(width=width, results=1))
-        values = [tour.value(self.duration_days) for tour in tours]
-        return replace(plan, value=max(values, default=0.0))
+    def valued(self, plan: Plan, settings: HomingSettings, probes: int) -> Plan:
+        """Return a plan with its value: the mean of its best predicted tours; 0 for too few.
+
+        Each probe leaves its asteroids to none that follow.
+        """
+        avoid: list[int] = []
+        total = 0.0
+        for _ in range(probes):
+            tours = self.tours(plan, settings, avoid)
+            if not tours:
+                return replace(plan, value=0.0)
+            best = max(tours, key=lambda tour: tour.value(self.duration_days))
+            total += best.value(self.duration_days)
+            avoid += best.itinerary.rows[1:-1].tolist()
+        return replace(plan, value=total / probes)
 
     def tours(
         self,
         plan: Plan,
         settings: HomingSettings,
-        avoid: tuple[int, ...] = (),
+        avoid: Sequence[int] = (),
         offset_days: float = 0.0,
     ) -> list[Homecoming]:
         """Return predicted tours of one probe, best first."""
@@ -230,8 +289,8 @@ class Screen:
                 float(routes.tof_days[k]),
                 v_inf=self.rules.v_inf_max_m_s,
                 window_mjd2000=(
-                    max(self.rules.launch_mjd2000[0], plan.window_mjd2000 - self._latest_days()),
-                    self.rules.launch_mjd2000[1],
+                    max(self.launch_mjd2000[0], plan.window_mjd2000 - self._latest_days()),
+                    self.launch_mjd2000[1],
                 ),
                 latest_arrival_days=latest,
             )

@@ -199,7 +199,8 @@ class Schedule:
     def course(self, x: _Array, stays: tuple[int | None, int | None]) -> Course:
         """Return the course of one variant, (k,)."""
         outing = self.fly(x[None])
-        impulses, settled = [], 0
+        impulses: list[CarrierImpulse] = []
+        settled = 0
         starts, ends = dict[int, int](), dict[int, int]()
         stay_epochs = {Act.RELEASE: 0.0, Act.CAPTURE: 0.0}
         for k, step in enumerate(self.steps):

@@ -18,7 +18,7 @@ from seqsearch.polish.itinerary import Itinerary
 from seqsearch.problems.rendezvous import RendezvousProblem
 from seqsearch.tours.carrier.records import CarrierImpulse
 
-_FORMAT: Final = "seqsearch-campaign-1"
+_FORMAT: Final = "seqsearch-campaign-2"
 
 _PlanRow = tuple[int, int, float, float]
 """Ids of both orbits' bodies, window, value."""
@@ -59,12 +59,14 @@ class _StateRecord(_Record, frozen=True, kw_only=True):
     limit_s: float | None
     spent_s: float
     catalogue_sha256: str
-    looked: int
-    joined: int
+    looked: tuple[int, ...]
     manned: int
+    launch_share: float
     tried: int
     rated: tuple[_PlanRow, ...]
-    paired: tuple[_PlanRow, ...]
+    sifted: tuple[_PlanRow, ...]
+    continued: tuple[_PlanRow, ...]
+    judged: tuple[_PlanRow, ...]
     crews: tuple[_CrewRecord, ...]
 
 
@@ -87,12 +89,14 @@ def write_state(path: Path, state: CampaignState, problem: RendezvousProblem) ->
         limit_s=state.limit_s,
         spent_s=state.spent_s,
         catalogue_sha256=state.catalogue_sha256,
-        looked=state.looked,
-        joined=state.joined,
+        looked=tuple(state.looked),
         manned=state.manned,
+        launch_share=state.launch_share,
         tried=state.tried,
         rated=tuple(map(plan_row, state.rated)),
-        paired=tuple(map(plan_row, state.paired)),
+        sifted=tuple(map(plan_row, state.sifted)),
+        continued=tuple(map(plan_row, state.continued)),
+        judged=tuple(map(plan_row, state.judged)),
         crews=tuple(
             _CrewRecord(
                 plan=plan_row(crew.plan),
@@ -161,12 +165,14 @@ def read_state(path: Path, problem: RendezvousProblem) -> CampaignState:
         limit_s=record.limit_s,
         spent_s=record.spent_s,
         catalogue_sha256=record.catalogue_sha256,
-        looked=record.looked,
-        joined=record.joined,
+        looked=list(record.looked),
         manned=record.manned,
+        launch_share=record.launch_share,
         tried=record.tried,
         rated=[plan_of(row) for row in record.rated],
-        paired=[plan_of(row) for row in record.paired],
+        sifted=[plan_of(row) for row in record.sifted],
+        continued=[plan_of(row) for row in record.continued],
+        judged=[plan_of(row) for row in record.judged],
         crews=[crew_of(crew) for crew in record.crews],
     )
 

@@ -14,7 +14,7 @@ from feasibility.runtime.provenance import provenance
 from feasibility.runtime.terminal import Level, say
 from feasibility.runtime.workers import default_workers
 from seqsearch.budget import Limits
-from seqsearch.carriers.campaign import Campaign, CampaignSettings, CampaignState
+from seqsearch.carriers.campaign import Campaign, CampaignSettings, CampaignState, launches_of
 from seqsearch.carriers.crew import Crew
 from seqsearch.carriers.flight import carrier_of
 from seqsearch.carriers.plans import Screen
@@ -38,6 +38,14 @@ from seqsearch.runs.run_folder import CONFIG, CSV, PROVENANCE, SEQUENCE, portabl
 from seqsearch.runs.session import PACKAGES
 from seqsearch.tours.carrier.carrier_files import CARRIER, write_carrier
 from seqsearch.tours.tour_files import to_csv, to_json
+
+CHART: Final = "chart"
+"""Name of the folder with the chart of all legs. It can be deleted; it is made anew."""
+
+_WHOLE_WINDOW_S: Final = 1800.0
+_LEAST_SHARE: Final = 0.2
+"""Time limit from which on the whole launch window is looked at, and the share of it that is
+looked at in any case."""
 
 STATE: Final = "carrier-state.json"
 """Name of the file that a carrier's run goes on from."""
@@ -77,6 +85,11 @@ def begin_carrier(
         )
         state = CampaignState(seed=seed, limit_s=limits.time_limit_s)
         state.catalogue_sha256 = catalogue_digest(catalogue)
+        if limits.time_limit_s is not None:
+            least = limits.time_limit_s / _WHOLE_WINDOW_S
+            state.launch_share = min(max(least, _LEAST_SHARE), 1.0)
+        if settings is not None:
+            state.launch_share = settings.launch_share
         return _run(path, config, problem, state, limits, settings)
 
 
@@ -85,8 +98,13 @@ def is_carrier_search(path: Path) -> bool:
     return (path / STATE).is_file()
 
 
-def resume_carrier(path: Path, limits: Limits, catalogue: str | None) -> int:
-    """Go on with the run of a carrier and return the exit code.
+def resume_carrier(
+    path: Path,
+    limits: Limits,
+    catalogue: str | None,
+    settings: CampaignSettings | None = None,
+) -> int:
+    """Go on with the run of a carrier and return the exit code; settings are those it began with.
 
     Raises
     ------
@@ -111,7 +129,7 @@ def resume_carrier(path: Path, limits: Limits, catalogue: str | None) -> int:
                 "expected a larger --time-limit"
             )
         say(f"{config.problem.name}: going on in {path} after {state.spent_s:.0f} s")
-        return _run(path, config, problem, state, limits)
+        return _run(path, config, problem, state, limits, settings)
 
 
 def _problem(config: Config, catalogue: Catalogue) -> RendezvousProblem:
@@ -132,7 +150,9 @@ def _run(
     predictor = predictor_of(parse_pruner(config.search.pruner))
     if predictor is None:
         raise InputError(f"pruner {config.search.pruner}: expected one with a trained model")
-    screen = Screen(problem, carrier_rules(config.problem.name), predictor, config.search)
+    rules = carrier_rules(config.problem.name)
+    launches = launches_of(rules, state)
+    screen = Screen(problem, rules, predictor, config.search, path / CHART, launches)
     written: list[Crew] = []
     workers = limits.workers or default_workers()
 

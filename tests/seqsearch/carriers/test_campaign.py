@@ -7,6 +7,7 @@ import pytest
 from seqsearch import read_tour
 from seqsearch.budget import Limits
 from seqsearch.carriers.campaign import CampaignSettings
+from seqsearch.carriers.homing import HomingSettings
 from seqsearch.commands.cli import main
 from seqsearch.problems.problem_file import read_config
 from seqsearch.runs.carrier_run import STATE, begin_carrier
@@ -30,7 +31,7 @@ max_duration_days = 2191.5
 min_stay_days = 30.0
 
 [catalogue]
-synthetic_bodies = 8000
+synthetic_bodies = 12000
 synthetic_seed = 7
 
 [search]
@@ -40,7 +41,16 @@ tof_days_max = 240.0
 
 pytestmark = pytest.mark.slow
 
-TINY = CampaignSettings(bodies=2, pairs=1, crews=2, width=10, improvements=2)
+TINY = CampaignSettings(
+    rated=4000,
+    sifted=200,
+    continued=1,
+    judged=2,
+    manned=2,
+    improvements=4,
+    crews=HomingSettings(width=100, results=2),
+    launch_share=0.01,
+)
 
 
 @pytest.fixture(scope="module")
@@ -81,7 +91,9 @@ def test_asteroids_are_counted_once(run):
 
 def test_a_run_without_a_limit_is_complete_and_a_damaged_state_is_an_error(run):
     state = json.loads((run / STATE).read_text())
-    assert (state["looked"], state["tried"]) == (2, 2)
+    assert state["looked"][1] == min(200, len(state["rated"])) > 2
+    assert state["looked"][3] == 2
+    assert (state["manned"], state["tried"]) == (2, 4)
     (run / STATE).rename(run / "kept")
     (run / STATE).write_text("{}")
     assert main(["resume", str(run)]) == 2
