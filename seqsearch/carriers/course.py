@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from feasibility.constants import MU_SUN
 from feasibility.orbits import Catalogue
 from feasibility.orbits.classical import cartesian_to_classical
+from seqsearch.carriers.routes import Route
 from seqsearch.tours.carrier.path import coasted
 from seqsearch.tours.carrier.records import CarrierImpulse
 
@@ -43,6 +44,8 @@ class Course:
     stay_epochs : tuple of float
         When the first of them is released there, and the second one caught, MJD2000. Their stays
         may be longer than they have to be.
+    route : Route, optional
+        To the first orbit; default: that of the plan.
     """
 
     impulses: tuple[CarrierImpulse, ...]
@@ -51,6 +54,7 @@ class Course:
     ends: tuple[int, ...]
     stays: tuple[int | None, int | None]
     stay_epochs: tuple[float, float] = (0.0, 0.0)
+    route: Route | None = None
 
     def window(self, coast: int) -> tuple[float, float]:
         """Return the epochs between which she is on a coast."""

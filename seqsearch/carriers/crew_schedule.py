@@ -3,11 +3,12 @@
 from dataclasses import replace
 from typing import Final
 
+import numpy as np
+
 from seqsearch.carriers.crew import MISSION_DAYS, TOUCH_DAYS, WAIT_DAYS, Crew
-from seqsearch.carriers.flight import captures_of, carrier_of, releases_of
+from seqsearch.carriers.flight import captures_of, carrier_of, releases_of, route_of
 from seqsearch.carriers.plans import Screen
 from seqsearch.carriers.schedule import Act, Schedule, Step
-from seqsearch.tours.carrier.path import mass_after
 from seqsearch.tours.carrier.records import CarrierImpulse
 
 _FIRST_LEAD_DAYS: Final = 12.0
@@ -24,10 +25,16 @@ def schedule_of(screen: Screen, crew: Crew) -> Schedule | None:
     the capture of the one that stays at the second's. Before each other release and capture there
     is an impulse.
     """
-    route = screen.route(crew.plan)
+    route = route_of(screen, crew)
     carrier = carrier_of(screen, crew)
     if route is None or carrier is None:
         return None
+    rules = screen.rules
+    if crew.course is None:
+        # The plan's way leaves time for tours as long as they may be.
+        earliest = max(captures_of(crew)) + _RESERVE_DAYS - rules.max_duration_days
+        other = screen.cheapest_route(crew.plan.first, earliest, min(releases_of(crew)))
+        route = other if other is not None and other.delta_v < route.delta_v else route
     impulses = list(carrier.impulses[2:])
     count = len(crew.flights)
     releases = sorted(zip(releases_of(crew), range(count), strict=True))
@@ -38,10 +45,10 @@ def schedule_of(screen: Screen, crew: Crew) -> Schedule | None:
         if crew.course is not None
         else _steps(releases, captures, stays, impulses)
     )
-    rules = screen.rules
+    steps[0] = replace(steps[0], range_mjd2000=(route.second_mjd2000 + TOUCH_DAYS, np.inf))
     if stays[1] is not None:
         steps = _with_late_capture(
-            steps, crew, stays[1], carrier.launch.t_mjd2000 + rules.max_duration_days
+            steps, crew, stays[1], route.launch_mjd2000 + rules.max_duration_days
         )
     return Schedule(
         steps,
@@ -49,7 +56,7 @@ def schedule_of(screen: Screen, crew: Crew) -> Schedule | None:
         crew.plan.first,
         crew.plan.second,
         rules,
-        mass_after(rules, rules.m0_kg, route.delta_v),
+        route,
         [float(flight.mass[-1]) for flight in crew.flights],
     )
 

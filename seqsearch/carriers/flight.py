@@ -5,6 +5,7 @@ from seqsearch.carriers.course import Course
 from seqsearch.carriers.crew import TOUCH_DAYS, WAIT_DAYS, Crew
 from seqsearch.carriers.mother import change_orbit, mother_flight
 from seqsearch.carriers.plans import Screen
+from seqsearch.carriers.routes import Route
 from seqsearch.tours.carrier.path import fly_carrier
 from seqsearch.tours.carrier.records import Carrier, CarrierImpulse
 
@@ -29,9 +30,16 @@ def captures_of(crew: Crew) -> list[float]:
     return epochs
 
 
+def route_of(screen: Screen, crew: Crew) -> Route | None:
+    """Return the mother ship's way to her first orbit; None for none."""
+    if crew.course is not None and crew.course.route is not None:
+        return crew.course.route
+    return screen.route(crew.plan)
+
+
 def carrier_of(screen: Screen, crew: Crew) -> Carrier | None:
     """Return the mother ship's flight; None where she has not the propellant or the time."""
-    route = screen.route(crew.plan)
+    route = route_of(screen, crew)
     if route is None:
         return None
     releases, captures = releases_of(crew), captures_of(crew)

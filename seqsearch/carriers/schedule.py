@@ -16,7 +16,8 @@ from feasibility.constants import DAY_S, MU_SUN
 from feasibility.orbits import Catalogue
 from feasibility.orbits.lambert import lambert
 from seqsearch.carriers.course import Course
-from seqsearch.tours.carrier.path import coasted
+from seqsearch.carriers.routes import Route
+from seqsearch.tours.carrier.path import coasted, mass_after
 from seqsearch.tours.carrier.records import CarrierImpulse, CarrierRules
 
 _Array = NDArray[np.float64]
@@ -110,8 +111,8 @@ class Schedule:
         The asteroids, and the rows of those of both orbits.
     rules : CarrierRules
         The mother ship.
-    mass_kg : float
-        What she weighs on the first orbit, with all probes.
+    route : Route
+        To the first orbit.
     caught_kg : sequence of float
         Mass of each probe when it comes back.
     """
@@ -123,13 +124,14 @@ class Schedule:
         first: int,
         second: int,
         rules: CarrierRules,
-        mass_kg: float,
+        route: Route,
         caught_kg: Sequence[float],
     ) -> None:
         self.steps = tuple(steps)
         self._catalogue, self._first, self._second = catalogue, first, second
         self._rules = rules
-        self._mass_kg = mass_kg
+        self._route = route
+        self._mass_kg = mass_after(rules, rules.m0_kg, route.delta_v)
         self._caught_kg = tuple(caught_kg)
         self._t_base = np.array([step.t_mjd2000 for step in steps])
         self._timed = np.flatnonzero([step.free for step in steps])
@@ -222,6 +224,7 @@ class Schedule:
             starts=tuple(starts[number] for number in sorted(starts)),
             ends=tuple(ends[number] for number in sorted(ends)),
             stays=stays,
+            route=self._route,
             stay_epochs=(stay_epochs[Act.RELEASE], stay_epochs[Act.CAPTURE]),
         )
 

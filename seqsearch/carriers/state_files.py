@@ -13,6 +13,7 @@ from seqsearch.carriers.campaign import CampaignState
 from seqsearch.carriers.course import Course
 from seqsearch.carriers.crew import Crew, own_problem
 from seqsearch.carriers.plans import Plan
+from seqsearch.carriers.routes import Route
 from seqsearch.polish.flight import fly
 from seqsearch.polish.itinerary import Itinerary
 from seqsearch.problems.rendezvous import RendezvousProblem
@@ -43,6 +44,7 @@ class _CourseRecord(_Record, frozen=True, kw_only=True):
     ends: tuple[int, ...]
     stays: tuple[int | None, int | None]
     stay_epochs: tuple[float, float]
+    route: Route | None
 
 
 @final
@@ -117,6 +119,7 @@ def write_state(path: Path, state: CampaignState, problem: RendezvousProblem) ->
                     ends=crew.course.ends,
                     stays=crew.course.stays,
                     stay_epochs=crew.course.stay_epochs,
+                    route=crew.course.route,
                 ),
             )
             for crew in state.crews
@@ -194,4 +197,5 @@ def _course_of(path: Path, crew: _CrewRecord) -> Course | None:
         ends=course.ends,
         stays=course.stays,
         stay_epochs=course.stay_epochs,
+        route=course.route,
     )
