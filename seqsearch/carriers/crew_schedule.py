@@ -1,6 +1,7 @@
 """From a crew to the schedule of its mother ship: which impulses may serve which probe."""
 
 from dataclasses import replace
+from itertools import product
 from typing import Final
 
 import numpy as np
@@ -37,14 +38,17 @@ def schedule_of(screen: Screen, crew: Crew) -> Schedule | None:
         route = other if other is not None and other.delta_v < route.delta_v else route
     impulses = list(carrier.impulses[2:])
     count = len(crew.flights)
-    releases = sorted(zip(releases_of(crew), range(count), strict=True))
-    captures = sorted(zip(captures_of(crew), range(count), strict=True))
-    stays = crew.waits() if crew.course is None else crew.course.stays
-    steps = (
-        _steps_again(crew, releases, captures, impulses)
-        if crew.course is not None
-        else _steps(releases, captures, stays, impulses)
-    )
+    if crew.course is None:
+        stays = _stays(crew)
+        begins, ends = _with_stays(crew, stays)
+        releases = sorted(zip(begins, range(count), strict=True))
+        captures = sorted(zip(ends, range(count), strict=True))
+        steps = _steps(releases, captures, stays, impulses)
+    else:
+        stays = crew.course.stays
+        releases = sorted(zip(releases_of(crew), range(count), strict=True))
+        captures = sorted(zip(captures_of(crew), range(count), strict=True))
+        steps = _steps_again(crew, releases, captures, impulses)
     steps[0] = replace(steps[0], range_mjd2000=(route.second_mjd2000 + TOUCH_DAYS, np.inf))
     if stays[1] is not None:
         steps = _with_late_capture(
@@ -57,17 +61,56 @@ def schedule_of(screen: Screen, crew: Crew) -> Schedule | None:
         crew.plan.second,
         rules,
         route,
+        stays,
         [float(flight.mass[-1]) for flight in crew.flights],
     )
 
 
 _Epochs = list[tuple[float, int]]
+_Stays = tuple[int | None, int | None]
+
+
+def _stays(crew: Crew) -> _Stays:
+    """Return which probes had best stay: those released first and caught first.
+
+    Then she is free to serve the others. As many stay as `Crew.waits` says.
+    """
+    wanted = crew.waits()
+    begins, ends = _with_stays(crew, (None, None))
+    best, earliest = wanted, (np.inf, np.inf)
+    for first, second in product(*[_others(crew, probe) for probe in wanted]):
+        stays = first, second
+        released, caught = _with_stays(crew, stays)
+        if max(b - a for a, b in zip(released, caught, strict=True)) > MISSION_DAYS:
+            continue
+        when = (
+            -np.inf if first is None else begins[first],
+            -np.inf if second is None else ends[second],
+        )
+        if when < earliest:
+            best, earliest = stays, when
+    return best
+
+
+def _others(crew: Crew, probe: int | None) -> list[int | None]:
+    return [None] if probe is None else [*range(len(crew.flights))]
+
+
+def _with_stays(crew: Crew, stays: _Stays) -> tuple[list[float], list[float]]:
+    """Return the epochs of all releases and captures if some probes stay."""
+    begins = [float(flight.itinerary.t_dep_mjd2000[0]) for flight in crew.flights]
+    ends = [float(flight.itinerary.t_arr_mjd2000[-1]) for flight in crew.flights]
+    if stays[0] is not None:
+        begins[stays[0]] -= WAIT_DAYS
+    if stays[1] is not None:
+        ends[stays[1]] += WAIT_DAYS
+    return begins, ends
 
 
 def _steps(
     releases: _Epochs,
     captures: _Epochs,
-    stays: tuple[int | None, int | None],
+    stays: _Stays,
     change: list[CarrierImpulse],
 ) -> list[Step]:
     """Return the steps of a mother ship that changes her orbit once so far."""

@@ -159,8 +159,7 @@ def _once(
     x = program.solve(schedule.start() + stirred * rng.normal(size=len(schedule.start())))
     if x is None:
         return None
-    stays = crew.waits() if crew.course is None else crew.course.stays
-    return _retimed(screen, problem, crew, schedule, x, stays)
+    return _retimed(screen, problem, crew, schedule, x)
 
 
 def _ends(crew: Crew, schedule: Schedule) -> list[_End]:
@@ -304,10 +303,9 @@ def _retimed(
     crew: Crew,
     schedule: Schedule,
     x: _Array,
-    stays: tuple[int | None, int | None],
 ) -> Crew | None:
     """Return the crew on a schedule's course, its tours retimed; None where one fails."""
-    trial = replace(crew, course=schedule.course(x, stays))
+    trial = replace(crew, course=schedule.course(x))
     epochs = schedule.epochs(x[None])[0]
     flights = list(crew.flights)
     for number, flight in enumerate(crew.flights):

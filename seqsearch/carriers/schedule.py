@@ -113,6 +113,8 @@ class Schedule:
         The mother ship.
     route : Route
         To the first orbit.
+    stays : tuple
+        The probes that stay at the asteroids of both orbits; None for none.
     caught_kg : sequence of float
         Mass of each probe when it comes back.
     """
@@ -125,6 +127,7 @@ class Schedule:
         second: int,
         rules: CarrierRules,
         route: Route,
+        stays: tuple[int | None, int | None],
         caught_kg: Sequence[float],
     ) -> None:
         self.steps = tuple(steps)
@@ -132,6 +135,7 @@ class Schedule:
         self._rules = rules
         self._route = route
         self._mass_kg = mass_after(rules, rules.m0_kg, route.delta_v)
+        self._stays = stays
         self._caught_kg = tuple(caught_kg)
         self._t_base = np.array([step.t_mjd2000 for step in steps])
         self._timed = np.flatnonzero([step.free for step in steps])
@@ -198,7 +202,7 @@ class Schedule:
                 mass *= np.exp(-size / exhaust)
         return mass - sum(self._caught_kg) - rules.m_dry_kg
 
-    def course(self, x: _Array, stays: tuple[int | None, int | None]) -> Course:
+    def course(self, x: _Array) -> Course:
         """Return the course of one variant, (k,)."""
         outing = self.fly(x[None])
         impulses: list[CarrierImpulse] = []
@@ -223,7 +227,7 @@ class Schedule:
             settled=settled,
             starts=tuple(starts[number] for number in sorted(starts)),
             ends=tuple(ends[number] for number in sorted(ends)),
-            stays=stays,
+            stays=self._stays,
             route=self._route,
             stay_epochs=(stay_epochs[Act.RELEASE], stay_epochs[Act.CAPTURE]),
         )
