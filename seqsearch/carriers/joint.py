@@ -27,7 +27,7 @@ from seqsearch.problems.rendezvous import RendezvousProblem
 
 _Array = NDArray[np.float64]
 
-LEAD_DAYS: Final = 3.0
+LEAD_DAYS: Final = 4.0
 """Least time between an impulse and a release or capture: retiming shifts them a little."""
 
 _SPARE_KG: Final = 0.5
