@@ -21,7 +21,7 @@ from seqsearch.carriers.crew_schedule import schedule_of
 from seqsearch.carriers.flight import carrier_of
 from seqsearch.carriers.plans import Screen
 from seqsearch.carriers.schedule import Act, Outing, Schedule, Step
-from seqsearch.polish.flight import Flight
+from seqsearch.polish.flight import Flight, fly
 from seqsearch.polish.retiming import retime
 from seqsearch.problems.rendezvous import RendezvousProblem
 
@@ -343,6 +343,18 @@ def _retimed_probe(
     own = own_problem(problem, crew, number)
     moved = replace(itinerary, t_dep_mjd2000=t_dep, tof_days=tof)
     retimed = retime(own, moved, max_iterations=_ITERATIONS)
-    if retimed is None or not retimed.flight.keeps_rules(own):
-        return None
-    return retimed.flight
+    found = None if retimed is None else _not_early(own, crew, number, retimed.flight)
+    return found if found is not None and found.keeps_rules(own) else None
+
+
+def _not_early(own: RendezvousProblem, crew: Crew, number: int, flight: Flight) -> Flight | None:
+    """Return a flight that ends on the coast it is meant for: its last leg may take longer."""
+    assert crew.course is not None
+    itinerary = flight.itinerary
+    begin, _ = crew.course.window(crew.course.ends[number])
+    late = begin + TOUCH_DAYS - float(itinerary.t_arr_mjd2000[-1])
+    if late <= 0.0:
+        return flight
+    tof = itinerary.tof_days.copy()
+    tof[-1] += late
+    return fly(own, replace(itinerary, tof_days=tof))
