@@ -30,8 +30,9 @@ _Array = NDArray[np.float64]
 LEAD_DAYS: Final = 4.0
 """Least time between an impulse and a release or capture: retiming shifts them a little."""
 
-_SPARE_KG: Final = 0.5
-"""Propellant of hers that is left, as probes come back some grams heavier or lighter."""
+_SPARES_KG: Final = (0.5, 10.0)
+"""Propellant of hers that is left, as probes come back some grams heavier or lighter; the second
+where that was too little."""
 
 _TRUST_DAYS: Final = (150.0, 45.0)
 """How far a round may move her epochs, and those of releases and captures."""
@@ -155,11 +156,17 @@ def _once(
     ends = _ends(crew, schedule)
     if not ends:
         return None
-    program = _Program(schedule, ends, problem, screen.predictor, wishes)
-    x = program.solve(schedule.start() + stirred * rng.normal(size=len(schedule.start())))
-    if x is None:
-        return None
-    return _retimed(screen, problem, crew, schedule, x)
+    x = schedule.start() + stirred * rng.normal(size=len(schedule.start()))
+    for spare_kg in _SPARES_KG:
+        program = _Program(schedule, ends, problem, screen.predictor, wishes, spare_kg)
+        solved = program.solve(x)
+        if solved is None:
+            return None
+        found = _retimed(screen, problem, crew, schedule, solved)
+        if found is not None:
+            return found
+        x = solved
+    return None
 
 
 def _ends(crew: Crew, schedule: Schedule) -> list[_End]:
@@ -199,8 +206,10 @@ class _Program:
         problem: RendezvousProblem,
         predictor: LegPredictor,
         wishes: Wishes,
+        spare_kg: float,
     ) -> None:
         self._schedule, self._ends = schedule, ends
+        self._spare_kg = spare_kg
         self._predictor, self._wishes = predictor, wishes
         self._craft = problem.spacecraft
         self._goals = [problem.catalogue.states_at([end.row], end.t_mjd2000)[0] for end in ends]
@@ -259,7 +268,7 @@ class _Program:
             gained += self._wishes.weights[end.probe] * value
         gaps = np.diff(outing.t, axis=1) - self._gaps
         return np.column_stack(
-            [gained / 10.0, (outing.left_kg - _SPARE_KG) / 10.0, gaps / 10.0, 10.0 * margins]
+            [gained / 10.0, (outing.left_kg - self._spare_kg) / 10.0, gaps / 10.0, 10.0 * margins]
         )
 
     def _margins(self, outing: Outing) -> tuple[_Array, _Array]:
