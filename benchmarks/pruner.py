@@ -2,7 +2,9 @@
 
 Run from the repository: python benchmarks/pruner.py [--legs N] [--threads 2]
 
-The candidates are those of the protocol "search" in a synthetic main belt. Each
+The candidates are those of the protocol "search" in a synthetic main belt. For the classifier
+there are fly-bys too, those of the protocol "flyby": any spacecraft, from any orbit past a
+position, four in five at any speed, the others with a bound on it. Each
 pruner gets them as legs, so its time is with features and everything. The classifier
 shares its work out to threads itself; for the others the batch is split over threads, as their
 kernels release the lock. pykep's mima2_from_hop, on a few of the legs, is given one leg at a
@@ -37,13 +39,15 @@ from feasibility.runtime.pykep_guard import load_pykep
 REPEATS = 5
 SINGLE_CALLS = 2000
 OURS, PYKEP = "classifier, recall 0.99", "pykep mima2_from_hop"
+FLY_BYS = "classifier, fly-bys"
 
 
-def candidates(n: int) -> Legs:
-    protocol = read_protocol("search")
+def candidates(name: str, n: int) -> Legs:
+    protocol = read_protocol(name)
     rng = np.random.default_rng(0)
     catalogue = synthetic_main_belt(16256, rng)
-    return protocol.sampler.draw(n, rng, catalogue, protocol.craft(), protocol.impulsive_grid).legs
+    craft = protocol.craft() if protocol.spacecraft else None
+    return protocol.sampler.draw(n, rng, catalogue, craft, protocol.impulsive_grid).legs
 
 
 def seconds(call: Callable[[], object], repeats: int = REPEATS) -> tuple[float, float]:
@@ -95,16 +99,20 @@ def main() -> None:
     parser.add_argument("--threads", type=int, default=2, help="threads (default 2)")
     parser.add_argument("--model", default="default", help="model file (default: the package's)")
     options = parser.parse_args()
-    legs = candidates(options.legs)
+    legs, fly_bys = candidates("search", options.legs), candidates("flyby", options.legs)
     few = legs.take(np.arange(min(SINGLE_CALLS, len(legs))))
     classifier = FeasibilityClassifier.load(options.model)
     pruner = ClassifierPruner(classifier, recall=0.99, threads=options.threads)
     print(
         f"{len(legs)} candidates, {options.threads} threads; the classifier keeps "
-        f"{pruner.keep(legs).mean():.3f} of them"
+        f"{pruner.keep(legs).mean():.3f} of them, and {pruner.keep(fly_bys).mean():.3f} of as "
+        "many fly-bys"
     )
     print(f"{'':<26} {'legs/s':>10} {'us a leg':>10}")
-    calls = {OURS: (lambda: pruner.keep(legs), legs)}
+    calls = {
+        OURS: (lambda: pruner.keep(legs), legs),
+        FLY_BYS: (lambda: pruner.keep(fly_bys), fly_bys),
+    }
     for name, other in (
         ("lambert", LambertPruner()),
         ("mima", MimaPruner()),
@@ -121,7 +129,7 @@ def main() -> None:
         wall, processor = seconds(call)
         rates[name], used[name] = len(asked) / wall, processor / len(asked)
         print(f"{name:<26} {rates[name]:>10.0f} {1e6 * used[name]:>10.2f}", flush=True)
-        if name == OURS:
+        if name == FLY_BYS:
             peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
             print(f"  peak memory so far {peak:.0f} MB")
     for name in (PYKEP, NEURAL):

@@ -12,8 +12,10 @@ from feasibility.errors import InputError
 
 _Arrays = Mapping[str, NDArray[Any]]
 
-_NETS: Final = ("model", "quick", "final_mass")
+_NETS: Final = ("model", "quick", "middle", "final_mass")
 """Sections of a margin model that are nets; those for free ends have a prefix besides."""
+
+_OPTIONAL_NETS: Final = ("middle", "final_mass")
 
 
 @final
@@ -95,7 +97,7 @@ def _check_view(artefact: Artefact, view: LegView) -> None:
     for name in _NETS:
         section = view.section(name)
         arrays = artefact.section(section)
-        if arrays or name != "final_mass":
+        if arrays or name not in _OPTIONAL_NETS:
             _check_net(arrays, None)
             inputs = len(_numbers(arrays, "mean", arrays["weight_0"].shape[1]))
             std = _numbers(arrays, "std", inputs)
@@ -110,6 +112,14 @@ def _check_view(artefact: Artefact, view: LegView) -> None:
             _numbers(mass, "error_fit", 3)
     rows = (len(view.kinds),) if view.kinds else ()
     _numbers(quick, "settled", *rows, 2)
+    middle = artefact.section(view.section("middle"))
+    if middle:
+        _numbers(middle, "settled", *rows, 2)
+        k = len(middle["mean"])
+        _expect(
+            k == len(view.quick_names),
+            f"{view.section('middle')}: {k} inputs, expected {len(view.quick_names)}",
+        )
     low = _numbers(domain, "low", None)
     _numbers(domain, "high", len(low))
     levels = _numbers(calibration, "levels", *rows, None)

@@ -12,7 +12,14 @@ from numpy.typing import NDArray
 from feasibility.classifier.classifier import FeasibilityClassifier
 from feasibility.classifier.margin.prediction import LegPrediction
 from feasibility.dataset import Dataset
-from feasibility.evaluation.metrics import Confusion, reliability, roc_curve, summary
+from feasibility.evaluation.metrics import (
+    Confusion,
+    has_both_classes,
+    one_class_summary,
+    reliability,
+    roc_curve,
+    summary,
+)
 from feasibility.evaluation.peers import Peer, PeerOutcome, ask, near_boundary
 from feasibility.evaluation.tables import markdown_table
 from feasibility.legs import Legs
@@ -69,8 +76,8 @@ class Evaluation:
         dataset has it, relative, with the share of final masses that are as near as the model
         says. ``us_per_leg`` is processor time.
     pruning : tuple of dict
-        For each of `RECALLS`: threshold (the median one, as kinds of free ends have their own),
-        recall met, and share of the infeasible legs pruned.
+        For each of `RECALLS`, where both classes are there: threshold (the median one, as kinds
+        of free ends have their own), recall met, and share of the infeasible legs pruned.
     true_log_margin, log_margin : (n,) float64, optional
         log(m*/m0) by the dataset and by the model, for a model that knows margins.
     peers : tuple of PeerOutcome
@@ -92,19 +99,22 @@ class Evaluation:
                 ["measure", "value"],
                 [[name, _number(value)] for name, value in self.metrics.items()],
             ),
-            markdown_table(
-                ["recall asked", "threshold", "recall met", "infeasible pruned"],
-                [
-                    [
-                        f"{row['recall_asked']:g}",
-                        f"{row['threshold']:.4g}",
-                        f"{row['recall']:.4f}",
-                        f"{row['infeasible_pruned']:.4f}",
-                    ]
-                    for row in self.pruning
-                ],
-            ),
         ]
+        if self.pruning:
+            tables.append(
+                markdown_table(
+                    ["recall asked", "threshold", "recall met", "infeasible pruned"],
+                    [
+                        [
+                            f"{row['recall_asked']:g}",
+                            f"{row['threshold']:.4g}",
+                            f"{row['recall']:.4f}",
+                            f"{row['infeasible_pruned']:.4f}",
+                        ]
+                        for row in self.pruning
+                    ],
+                )
+            )
         if self.peers:
             models = [("this model", self.metrics), *((p.name, p.metrics) for p in self.peers)]
             rows = [[name, *_entries(metrics, SIDE_BY_SIDE)] for name, metrics in models]
@@ -120,7 +130,7 @@ class Evaluation:
         }
 
     def write(self, folder: Path, title: str) -> list[Path]:
-        """Write metrics.json, metrics.md, roc.png and reliability.png.
+        """Write metrics.json, metrics.md, reliability.png and, of both classes, roc.png.
 
         Raises
         ------
@@ -128,14 +138,15 @@ class Evaluation:
             The folder cannot be written to.
         """
         make_folder(folder)
-        paths = [
-            folder / name for name in ("metrics.json", "metrics.md", "roc.png", "reliability.png")
-        ]
+        names = ["metrics.json", "metrics.md", "reliability.png"]
+        paths = [folder / name for name in names]
         content = {"title": title, **self.to_dict(), "provenance": provenance()}
         write_json(paths[0], content)
         write_text(paths[1], f"# {title}\n\n{self.table()}")
-        self._plot_roc(paths[2], title)
-        self._plot_reliability(paths[3], title)
+        self._plot_reliability(paths[2], title)
+        if has_both_classes(self.y):
+            paths.append(folder / "roc.png")
+            self._plot_roc(paths[-1], title)
         if self.log_margin is not None and self.true_log_margin is not None:
             paths.append(folder / "margin.png")
             _plot_margins(self.true_log_margin, self.log_margin, paths[-1], title)
@@ -172,6 +183,9 @@ def evaluate(
 ) -> Evaluation:
     """Ask a model about the labelled legs of a dataset.
 
+    Of a dataset with one class, such as one for final masses, whose legs can all be flown, some
+    measures are left out.
+
     Parameters
     ----------
     classifier : FeasibilityClassifier
@@ -180,11 +194,6 @@ def evaluate(
         Legs with labels, none of which it was trained on.
     peers : sequence of Peer
         Others to ask about the same legs, where their label is the margin.
-
-    Raises
-    ------
-    InputError
-        The dataset has only one class.
     """
     part = dataset.take(np.flatnonzero(dataset.labelled))
     y = part.flyable
@@ -192,12 +201,13 @@ def evaluate(
     began = time.process_time()
     probability, inside = classifier.assess(part.legs)
     seconds = time.process_time() - began
-    metrics = summary(y, probability)
+    both = has_both_classes(y)
+    metrics = (summary if both else one_class_summary)(y, probability)
     metrics["in_domain"] = float(inside.mean())
     metrics["us_per_leg"] = 1e6 * seconds / len(y)
     true = part.columns["log_margin"]
     metrics |= near_boundary((probability >= 0.5) == y, true)
-    pruning = _pruning(classifier, part.legs, y, probability)
+    pruning = _pruning(classifier, part.legs, y, probability) if both else ()
     others = tuple(ask(peer, part.legs, y, true) for peer in peers)
     if classifier.artefact.kind != "margin":
         return Evaluation(y, probability, metrics, pruning, peers=others)

@@ -191,6 +191,37 @@ def summary(y: ArrayLike, probability: ArrayLike, threshold: float = 0.5) -> dic
     }
 
 
+def one_class_summary(
+    y: ArrayLike, probability: ArrayLike, threshold: float = 0.5
+) -> dict[str, float]:
+    """Return those measures of `summary` that need no legs of the other class.
+
+    Returns
+    -------
+    dict of str to float
+        n, share_feasible, accuracy, log_loss, calibration_error.
+
+    Raises
+    ------
+    InputError
+        The shapes differ.
+    """
+    truth, score = np.asarray(y, dtype=np.bool_), np.asarray(probability, dtype=np.float64)
+    return {
+        "n": float(len(truth)),
+        "share_feasible": float(truth.mean()),
+        "accuracy": Confusion.of(truth, score >= threshold).accuracy,
+        "log_loss": log_loss(truth, score),
+        "calibration_error": calibration_error(truth, score),
+    }
+
+
+def has_both_classes(y: ArrayLike) -> bool:
+    """Tell whether there are feasible legs and infeasible ones."""
+    truth = np.asarray(y, dtype=np.bool_)
+    return bool(truth.any() and not truth.all())
+
+
 def _ratio(part: float, whole: float) -> float:
     return part / whole if whole > 0 else 0.0
 

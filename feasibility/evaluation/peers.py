@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.constants import MU_SUN
-from feasibility.evaluation.metrics import Confusion, auc
+from feasibility.evaluation.metrics import Confusion, auc, has_both_classes
 from feasibility.legs import Legs
 from feasibility.orbits.lambert import lambert_delta_v, with_lambert_excess
 from feasibility.orbits.mima import mima, mima2
@@ -107,14 +107,18 @@ def ask(peer: Peer, legs: Legs, y: NDArray[np.bool_], log_margin: _Array) -> Pee
     seconds = time.process_time() - began
     answers = score >= 0.0
     counts = Confusion.of(y, answers)
+    two_sided = (
+        {"auc": auc(y, score), "balanced_accuracy": counts.balanced_accuracy}
+        if has_both_classes(y)
+        else {}
+    )
     metrics = {
         "accuracy": counts.accuracy,
         "precision": counts.precision,
         "recall": counts.recall,
         "f1": counts.f_score(1.0),
         "f10": counts.f_score(10.0),
-        "auc": auc(y, score),
-        "balanced_accuracy": counts.balanced_accuracy,
+        **two_sided,
         **near_boundary(answers == y, log_margin),
         "us_per_leg": 1e6 * seconds / len(legs),
     }

@@ -53,6 +53,19 @@ def summing_kernel(function: _F) -> _F:
     return _compiled(function, fastmath={"reassoc", "contract", "nsz"})
 
 
+def lane_kernel(function: _F) -> _F:
+    """Compile as `inner_kernel` what does the same for each of some lanes, as vectors.
+
+    A product and a sum may be one operation. All lanes are treated alike.
+    """
+    return _compiled(function, fastmath={"contract"}, no_cpython_wrapper=True)
+
+
+def lane_function(function: _F) -> _F:
+    """Compile as `lane_kernel` what its loops call: it becomes a part of them."""
+    return _compiled(function, fastmath={"contract"}, no_cpython_wrapper=True, forceinline=True)
+
+
 @contextmanager
 def rare_collections() -> Iterator[None]:
     """Let Python look for garbage more rarely while much is compiled: a tenth less time.

@@ -22,6 +22,10 @@ _DELAYS_DAYS: Final = (0.0, 12.0, 28.0, 50.0, 80.0, 120.0, 180.0)
 
 SHORTEST_DAYS: Final = 40.0
 LONGEST_DAYS: Final = 500.0
+
+_MOST: Final = float(np.log(1e6))
+"""Largest log(m*/m0) that is told: a leg that needs no thrust has none."""
+
 _FLIGHTS: Final = 16
 """Flight times that are tried: far-off ends are reached by slow flights alone."""
 
@@ -74,7 +78,7 @@ def ways_home(problem: Problem, ending: Ending, nodes: Nodes, predictor: LegPred
     parent, wait = np.repeat(parent, _FLIGHTS), np.repeat(wait, _FLIGHTS)
     t_dep, tof_days = departure[parent, wait], tof.ravel()
     hops = hops_home(problem, ending, nodes, parent, t_dep, tof_days)
-    log = log_margin(predictor.margin, hops)
+    log = np.minimum(log_margin(predictor.margin, hops), _MOST)
     m_final = bounded_final_mass(hops.legs[-1], np.exp(np.nan_to_num(log, nan=0.0)))
     return WaysHome(parent, t_dep, tof_days, log, m_final)
 

@@ -26,7 +26,7 @@ from feasibility.orbits.lambert import lambert_delta_v
 from seqsearch.core.ending import ending_of, fixed_start, rows_to_avoid
 from seqsearch.core.problem import Problem
 from seqsearch.polish.flight import Flight
-from seqsearch.polish.itinerary import Itinerary
+from seqsearch.polish.itinerary import Itinerary, excess_speeds
 
 _Array = NDArray[np.float64]
 _Index = NDArray[np.intp]
@@ -172,6 +172,7 @@ class Extender:
         self._end = None if ending is None else ending.row
         self._start = fixed_start(problem)
         self._avoid = rows_to_avoid(problem)
+        self._launch, self._arrival = excess_speeds(problem)
 
     def extend(self, flight: Flight, extension: Extension, *, avoid: _Index) -> list[Itinerary]:
         """Return the kept part with new bodies, the most promising itineraries first.
@@ -185,7 +186,7 @@ class Extender:
         avoid : (k,) intp
             Catalogue rows that are not visited, besides those that are kept.
         """
-        base = flight.itinerary
+        base, problem = flight.itinerary, self._problem
         kept = base.part(extension.first, extension.last)
         avoid = np.union1d(np.union1d(kept.rows, avoid), self._avoid)
         backward = extension.first > 0 or extension.before > 0
@@ -201,7 +202,7 @@ class Extender:
         if not len(nodes.clock):
             return []
         best = np.argsort(self._cost(nodes, backward), kind="stable")[: self._settings.results]
-        return [_joined(kept, nodes, int(i), backward) for i in best]
+        return [_joined(kept, nodes, int(i), backward).with_ends_of(problem) for i in best]
 
     def _begin(self, flight: Flight, extension: Extension, backward: bool) -> _Nodes:
         base, problem = flight.itinerary, self._problem
@@ -242,7 +243,7 @@ class Extender:
             return nodes.take(np.zeros(0, dtype=np.intp))
         target = near[parent, place].astype(np.intp)
         tofs = np.asarray(settings.tofs_days)
-        price = self._lambert_price(nodes, parent, target, tofs, backward)
+        price = self._lambert_price(nodes, parent, target, tofs, backward, is_start)
         best = np.argmin(price, axis=1)
         cheapest = price[np.arange(len(price)), best]
         order = np.lexsort((cheapest, parent))
@@ -251,14 +252,14 @@ class Extender:
         parent, target, best = parent[chosen], target[chosen], best[chosen]
         # The boundary is near the flight time that is cheapest by Lambert, rather above it.
         window = np.clip(best[:, None] + np.arange(-2, 4), 0, len(tofs) - 1)
-        shortest = self._shortest_tof(nodes, parent, target, tofs[window], backward)
+        shortest = self._shortest_tof(nodes, parent, target, tofs[window], backward, is_start)
         good = np.isfinite(shortest)
         parent, target, shortest = parent[good], target[good], shortest[good]
         if not len(parent):
             return nodes.take(np.zeros(0, dtype=np.intp))
         parent, target = np.tile(parent, len(_LEISURE)), np.tile(target, len(_LEISURE))
         tof = np.concatenate([factor * shortest for factor in _LEISURE])
-        legs = self._legs(nodes, parent, target, tof, backward)
+        legs = self._legs(nodes, parent, target, tof, backward, is_start)
         final = np.nan_to_num(self._predictor.final_mass(legs), nan=0.0)
         clock = nodes.clock[parent]
         departure = clock - tof if backward else clock
@@ -282,7 +283,7 @@ class Extender:
         n, k = len(nodes.clock), len(_TIES_DAYS)
         parent, tofs = np.repeat(np.arange(n), k), np.tile(_TIES_DAYS, n)
         target = np.full(n * k, row, dtype=np.intp)
-        legs = self._legs(nodes, parent, target, tofs, backward)
+        legs = self._legs(nodes, parent, target, tofs, backward, True)
         margin = np.nan_to_num(self._predictor.margin(legs), nan=1e-9).reshape(n, k)
         flyable = margin >= 1.0 + _MARGIN
         best = np.where(flyable.any(axis=1), flyable.argmax(axis=1), margin.argmax(axis=1))
@@ -306,22 +307,39 @@ class Extender:
         return cost
 
     def _lambert_price(
-        self, nodes: _Nodes, parent: _Index, target: _Index, tofs: _Array, backward: bool
+        self,
+        nodes: _Nodes,
+        parent: _Index,
+        target: _Index,
+        tofs: _Array,
+        backward: bool,
+        at_end: bool,
     ) -> _Array:
         """Return (n, k) the price in days of n targets at k flight times; inf if out of reach."""
         settings, n, k = self._settings, len(parent), len(tofs)
         legs = self._legs(
-            nodes, np.repeat(parent, k), np.repeat(target, k), np.tile(tofs, n), backward
+            nodes, np.repeat(parent, k), np.repeat(target, k), np.tile(tofs, n), backward, at_end
         )
-        delta_v = lambert_delta_v(legs.rv_dep, legs.rv_arr, legs.tof_s, max_revs=0)
+        delta_v = lambert_delta_v(
+            *(legs.rv_dep, legs.rv_arr, legs.tof_s),
+            max_revs=0,
+            vinf_dep=legs.vinf_dep,
+            vinf_arr=legs.vinf_arr,
+        )
         available = legs.thrust / legs.m0 * legs.tof_s
-        overload = np.maximum(np.log(delta_v / available), 0.0)
+        overload = np.log(np.maximum(delta_v / available, 1.0))
         burnt = legs.m0 * -np.expm1(-np.minimum(delta_v, available) / legs.exhaust_velocity)
         price = legs.tof_days + settings.propellant_days_per_kg * burnt + _OVERLOAD_DAYS * overload
         return np.where(overload < _LARGEST_OVERLOAD, price, np.inf).reshape(n, k)
 
     def _shortest_tof(
-        self, nodes: _Nodes, parent: _Index, target: _Index, tofs: _Array, backward: bool
+        self,
+        nodes: _Nodes,
+        parent: _Index,
+        target: _Index,
+        tofs: _Array,
+        backward: bool,
+        at_end: bool,
     ) -> _Array:
         """Return (n,) the shortest flyable of (n, k) ascending flight times; NaN if none.
 
@@ -329,10 +347,11 @@ class Extender:
         """
         n, k = tofs.shape
         legs = self._legs(
-            nodes, np.repeat(parent, k), np.repeat(target, k), tofs.ravel(), backward
+            nodes, np.repeat(parent, k), np.repeat(target, k), tofs.ravel(), backward, at_end
         )
         margin = np.nan_to_num(self._predictor.margin(legs), nan=1e-9)
-        excess = np.log(np.maximum(margin, 1e-9)).reshape(n, k) - _MARGIN
+        # A leg that needs no thrust has no largest mass, and no line leads to inf.
+        excess = np.log(np.clip(margin, 1e-9, 1e9)).reshape(n, k) - _MARGIN
         flyable = excess >= 0
         first = np.argmax(flyable, axis=1)
         row = np.arange(n)
@@ -344,8 +363,15 @@ class Extender:
         return np.where(flyable.any(axis=1), tof, np.nan)
 
     def _legs(
-        self, nodes: _Nodes, parent: _Index, target: _Index, tof: _Array, backward: bool
+        self,
+        nodes: _Nodes,
+        parent: _Index,
+        target: _Index,
+        tof: _Array,
+        backward: bool,
+        at_end: bool,
     ) -> Legs:
+        """Return the legs; `at_end` are those from where tours start, or to where they end."""
         catalogue, craft = self._problem.catalogue, self._problem.spacecraft
         at, clock, mass = nodes.rows[parent, -1], nodes.clock[parent], nodes.mass[parent]
         dep, arr, departure = (target, at, clock - tof) if backward else (at, target, clock)
@@ -360,6 +386,8 @@ class Extender:
             craft.thrust,
             craft.isp,
             0.0,
+            vinf_dep=self._launch if at_end and backward else 0.0,
+            vinf_arr=self._arrival if at_end and not backward else 0.0,
         )
 
 

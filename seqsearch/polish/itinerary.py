@@ -8,12 +8,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from feasibility import InputError, Legs
 from feasibility.classifier.predictor import LegPredictor
-from seqsearch.core.ending import Ending
+from seqsearch.core.ending import Ending, ending_of
 from seqsearch.core.problem import Problem
 from seqsearch.core.way_home import SHORTEST_DAYS, ways_home
 from seqsearch.tours.events.fly_by import FlyBy
 from seqsearch.tours.events.launch import Launch
-from seqsearch.tours.tour import Tour, TourRules
+from seqsearch.tours.tour import Tour
 
 _SLACK = 2e-6
 """Share of a largest speed that legs leave: solvers may exceed theirs by half of it."""
@@ -78,14 +78,29 @@ class Itinerary:
             A body of the tour is not in the problem's catalogue, or visits are fly-bys: their
             legs cannot be flown one by one.
         """
-        vinf_dep, vinf_arr = _ends(problem.tour_rules(), len(tour.legs))
         return cls(
             rows=problem.catalogue.rows_of([body.id for body in tour.bodies]).astype(np.intp),
             t_dep_mjd2000=np.array([leg.t_dep_mjd2000 for leg in tour.legs]),
             tof_days=np.array([leg.tof_days for leg in tour.legs]),
-            vinf_dep=vinf_dep,
-            vinf_arr=vinf_arr,
-        )
+        ).with_ends_of(problem)
+
+    def with_ends_of(self, problem: Problem) -> Self:
+        """Return the itinerary as that of a whole tour, with the excess speeds of its ends.
+
+        The last arrival may have some only at the body at which tours end, if there is one.
+
+        Raises
+        ------
+        InputError
+            Visits are fly-bys.
+        """
+        launch, arrival = excess_speeds(problem)
+        ending = ending_of(problem)
+        vinf_dep, vinf_arr = np.zeros(len(self)), np.zeros(len(self))
+        vinf_dep[:1] = launch
+        if ending is None or ending.row in (None, int(self.rows[-1])):
+            vinf_arr[-1:] = arrival
+        return replace(self, vinf_dep=vinf_dep, vinf_arr=vinf_arr)
 
     def legs(self, problem: Problem, m0: ArrayLike) -> Legs:
         """Return the n legs at the given initial masses in kg.
@@ -137,13 +152,13 @@ class Itinerary:
         ways = ways_home(problem, ending, node, predictor)
         if len(ways) == 0:
             departure = float(node.t_ready_mjd2000[0])
-            return self.appended(ending.row, departure, SHORTEST_DAYS)
+            return self.appended(ending.row, departure, SHORTEST_DAYS).with_ends_of(problem)
         log = np.nan_to_num(ways.log_margin, nan=0.0)
         cost = np.where(log >= 0.0, ways.t_dep_mjd2000 + ways.tof_days, 1e9 - log)
         best = int(np.argmin(cost))
         return self.appended(
             ending.row, float(ways.t_dep_mjd2000[best]), float(ways.tof_days[best])
-        )
+        ).with_ends_of(problem)
 
     def part(self, first: int, last: int) -> Self:
         """Return the bodies from one position to another, both included, and their legs."""
@@ -156,14 +171,21 @@ class Itinerary:
         )
 
 
-def _ends(rules: TourRules, n: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return (n,) the largest excess velocities at departures and arrivals of n legs."""
-    vinf_dep, vinf_arr = np.zeros(n), np.zeros(n)
+def excess_speeds(problem: Problem) -> tuple[float, float]:
+    """Return m/s, the largest excess speeds of the first departure and of the last arrival.
+
+    Raises
+    ------
+    InputError
+        Visits are fly-bys: their legs cannot be flown one by one.
+    """
+    launch = arrival = 0.0
+    rules = problem.tour_rules()
     for event in rules.events:
         if isinstance(event, Launch):
-            vinf_dep[:1] = event.speed_max_m_s
+            launch = event.speed_max_m_s
         if isinstance(event, FlyBy):
-            if n > 1 and event.visit_bound(last=False) > 0.0:
+            if event.visit_bound(last=False) > 0.0:
                 raise InputError(f"problem {rules.name}: its visits are fly-bys, expected rest")
-            vinf_arr[-1:] = event.visit_bound(last=True)
-    return vinf_dep, vinf_arr
+            arrival = event.visit_bound(last=True)
+    return launch, arrival

@@ -276,18 +276,8 @@ def build_problem(config: Config, catalogue: Catalogue | None = None) -> Problem
             f"problem {config.problem.name}: tables [{own[0][0].name}] and [{own[1][0].name}], "
             "expected the rules of one problem"
         )
-    given = {
-        "a sequence": bool(mission.sequence),
-        "an end_id": mission.end_id is not None,
-        "must_visit": bool(mission.must_visit),
-        "[[bodies]]": bool(config.bodies),
-    }
-    for what in (what for what, there in given.items() if own and there):
-        raise InputError(
-            f"problem {config.problem.name}: {what} and a table [{own[0][0].name}], expected "
-            f"{what} only in tours of rendezvous alone"
-        )
     for plugin, rules in own:
+        _check_mission(config, plugin)
         if plugin.build is not None:
             problem = plugin.build(base, rules)
             if base.catalogue.ephemeris is not None and problem.catalogue.ephemeris is None:
@@ -297,6 +287,23 @@ def build_problem(config: Config, catalogue: Catalogue | None = None) -> Problem
                 )
             return problem
     return base
+
+
+def _check_mission(config: Config, plugin: ProblemPlugin) -> None:
+    """Check that a problem file says no more of the mission than a plug-in's rules go with."""
+    mission = config.mission
+    given = {
+        "sequence": ("a sequence", bool(mission.sequence)),
+        "end_id": ("an end_id", mission.end_id is not None),
+        "must_visit": ("must_visit", bool(mission.must_visit)),
+        "bodies": ("[[bodies]]", bool(config.bodies)),
+    }
+    for key, (what, there) in given.items():
+        if there and key not in plugin.mission_keys:
+            raise InputError(
+                f"problem {config.problem.name}: {what} and a table [{plugin.name}], expected "
+                f"{what} only in tours of rendezvous alone"
+            )
 
 
 def _on_the_way(config: Config) -> list[int]:

@@ -3,9 +3,11 @@
 A plug-in is a package with problem files (``*.toml``). If TOML alone cannot say its rules, its
 ``__init__`` also offers ``RULES``, a frozen `msgspec.Struct`, and ``build(base, rules)``, which
 returns a `Problem`. The name of the entry point is then the name of the table in problem files
-that has the rules. If a carrier with craft flies one of its problems, ``CARRIERS`` has a function
-for the name of that problem, which returns its `CarrierRules`. Importing the package should cost
-little: all plug-ins are imported whenever a problem file is read.
+that has the rules. Such a problem file has no ``sequence``, ``end_id``, ``must_visit`` and
+``[[bodies]]`` but those that ``MISSION_KEYS`` of the ``__init__`` names. If a carrier with craft
+flies one of its problems, ``CARRIERS`` has a function for the name of that problem, which returns
+its `CarrierRules`. Importing the package should cost little: all plug-ins are imported whenever a
+problem file is read.
 """
 
 from collections.abc import Callable
@@ -45,6 +47,9 @@ class ProblemPlugin:
         Its problem files: names of problems and TOML texts.
     carriers : dict of str to callable
         The rules of problems that a carrier flies, by the names of the problems.
+    mission_keys : tuple of str
+        Which of ``sequence``, ``end_id``, ``must_visit`` and ``bodies`` a problem file may have
+        beside the table with the rules.
     """
 
     name: str
@@ -52,6 +57,7 @@ class ProblemPlugin:
     build: Build | None
     files: dict[str, str]
     carriers: dict[str, Callable[[], CarrierRules]] = field(default_factory=dict)
+    mission_keys: tuple[str, ...] = ()
 
 
 @cache
@@ -142,4 +148,11 @@ def _loaded(entry: metadata.EntryPoint) -> ProblemPlugin:
         raise InputError(f"{label}: {entry.value} has one of RULES and build, expected both")
     if rules is not None and not (isinstance(rules, type) and issubclass(rules, msgspec.Struct)):
         raise InputError(f"{label}: RULES of {entry.value} is no msgspec.Struct")
-    return ProblemPlugin(entry.name, rules, build, files, dict(getattr(module, "CARRIERS", {})))
+    return ProblemPlugin(
+        entry.name,
+        rules,
+        build,
+        files,
+        dict(getattr(module, "CARRIERS", {})),
+        tuple(getattr(module, "MISSION_KEYS", ())),
+    )

@@ -23,6 +23,8 @@ from seqsearch.pruning.pruner_spec import parse_pruner, predictor_of
 from seqsearch.runs.checkpoint import FOLDER, Checkpoints, catalogue_digest
 from seqsearch.runs.run_folder import CONFIG, SEQUENCE, RunFolder, worth
 from seqsearch.runs.session import PACKAGES
+from seqsearch.tours.events.fly_by import FlyBy
+from seqsearch.tours.events.launch import Launch
 from seqsearch.tours.pictures.plots import plot_tour
 from seqsearch.tours.tour import Tour
 from seqsearch.tours.tour_files import read_tour
@@ -98,7 +100,7 @@ def _polished(
     if catalogue is not None:
         config = with_catalogue(config, catalogue)
     problem = build_problem(config)
-    if problem.custom_moves is not None or problem.tour_rules().events:
+    if problem.custom_moves is not None or not _at_rest_between(problem):
         raise InputError(
             f"{run}: {problem.name} is no tour of rendezvous alone, as polishing asks"
         )
@@ -137,6 +139,17 @@ def _polished(
     say(f"{result.tour.summary()}; polish {result.stopped}, {result.moves} moves")
     say(f"check it with: seqsearch verify {run}", Level.PROGRESS)
     return interrupt_code()
+
+
+def _at_rest_between(problem: Problem) -> bool:
+    """Tell whether tours have no other events than a launch and some speed at the end."""
+    for event in problem.tour_rules().events:
+        if isinstance(event, FlyBy):
+            if event.times > 0 or event.visit_bound(last=False) > 0.0:
+                return False
+        elif not isinstance(event, Launch):
+            return False
+    return True
 
 
 def _searched(run: Path, problem: Problem) -> list[Tour]:

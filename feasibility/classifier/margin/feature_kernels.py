@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from feasibility.classifier.margin.path_kernels import (
     N_NODES,
     SATURATED,
+    STRIDE,
     PathWork,
     first_path,
     flown_path,
@@ -157,7 +158,7 @@ def lambert_path(
     SATURATED where there is none.
     """
     v1, v2, dv1, dv2, state, x = lambert_work
-    path, rows, p, weights, g, c, m, d, anomaly = path_work
+    path, rows, p, weights, g, c, d, anomaly = path_work
     for j in range(3):
         dv1[j] = v1[b, j] - s0[3 + j]
         dv2[j] = s1[3 + j] - v2[b, j]
@@ -169,19 +170,19 @@ def lambert_path(
         d[j] = 0.0
     for i in range(N_NODES):
         for j in range(5):
-            path[j * N_NODES + i] = x[j]
+            path[j * STRIDE + i] = x[j]
     for end in range(2):
-        path[5 * N_NODES + end] = x[5] + end * x[0] * tof
+        path[5 * STRIDE + end] = x[5] + end * x[0] * tof
         anomaly[end] = (1 - end) * tof
     if not impulse_effects(path, 2, rows, anomaly):
         return SATURATED
     add_impulse(s0, v1[b], dv1, rows, int(0), d)
     add_impulse(s1, v2[b], dv2, rows, int(1), d)
     for i in range(N_NODES):
-        path[5 * N_NODES + i] = x[5] + x[0] * tof * (i + 0.5) / N_NODES
+        path[5 * STRIDE + i] = x[5] + x[0] * tof * (i + 0.5) / N_NODES
     if not gauss_rows(path, tof, N_NODES, rows, anomaly):
         return SATURATED
-    z = smallest_impulse(rows, d, ve, 0.0, N_NODES, int(_FIRST_STEPS), p, weights, g, c, m)
+    z = smallest_impulse(rows, d, ve, 0.0, N_NODES, int(_FIRST_STEPS), p, weights, g, c)
     return z if 0.0 < z < SATURATED else SATURATED
 
 
@@ -198,12 +199,12 @@ def add_impulse(r: _Array, v: _Array, dv: _Array, rows: _Array, i: int, d: _Arra
     u = dv[0] * x + dv[1] * y + dv[2] * z
     t = dv[0] * tx + dv[1] * ty + dv[2] * tz
     o = dv[0] * hx + dv[1] * hy + dv[2] * hz
-    d[0] += rows[i] * u + rows[N_NODES + i] * t
-    d[1] += rows[2 * N_NODES + i] * u + rows[3 * N_NODES + i] * t + rows[4 * N_NODES + i] * o
-    d[2] += rows[5 * N_NODES + i] * u + rows[6 * N_NODES + i] * t + rows[7 * N_NODES + i] * o
-    d[3] += rows[8 * N_NODES + i] * o
-    d[4] += rows[9 * N_NODES + i] * o
-    d[5] += rows[10 * N_NODES + i] * u + rows[11 * N_NODES + i] * t + rows[12 * N_NODES + i] * o
+    d[0] += rows[i] * u + rows[STRIDE + i] * t
+    d[1] += rows[2 * STRIDE + i] * u + rows[3 * STRIDE + i] * t + rows[4 * STRIDE + i] * o
+    d[2] += rows[5 * STRIDE + i] * u + rows[6 * STRIDE + i] * t + rows[7 * STRIDE + i] * o
+    d[3] += rows[8 * STRIDE + i] * o
+    d[4] += rows[9 * STRIDE + i] * o
+    d[5] += rows[10 * STRIDE + i] * u + rows[11 * STRIDE + i] * t + rows[12 * STRIDE + i] * o
 
 
 @inner_kernel
@@ -310,7 +311,7 @@ def quick_features(
     Parameters and result as for `leg_features`.
     """
     (
-        (path, rows, p, weights, g, c, m, d, anomaly),
+        (path, rows, p, weights, g, c, d, anomaly),
         (s0, s1, x0, x1, state),
         lambert_work,
         (lam, branch, _, _, _, _),
@@ -330,7 +331,7 @@ def quick_features(
     first_path(x0, x1, tof, near, _LEAST_MOTION, QUICK_NODES, path)
     if not gauss_rows(path, tof, QUICK_NODES, rows, anomaly):
         return np.nan
-    z = smallest_impulse(rows, d, ve, 0.0, QUICK_NODES, int(1), p, weights, g, c, m)
+    z = smallest_impulse(rows, d, ve, 0.0, QUICK_NODES, int(1), p, weights, g, c)
     if not 0.0 < z < SATURATED:
         return np.nan
     total = z * QUICK_NODES
@@ -377,11 +378,11 @@ def refine(
 
     A round that fails leaves the rest at the last value.
     """
-    path, rows, p, weights, g, c, m, d, anomaly = path_work
+    path, rows, p, weights, g, c, d, anomaly = path_work
     first_path(x0, x1, tof, excess, least, N_NODES, path)
     if not gauss_rows(path, tof, N_NODES, rows, anomaly):
         return False
-    value = smallest_impulse(rows, d, ve, 0.0, N_NODES, int(_FIRST_STEPS), p, weights, g, c, m)
+    value = smallest_impulse(rows, d, ve, 0.0, N_NODES, int(_FIRST_STEPS), p, weights, g, c)
     if not 0.0 < value < SATURATED:
         return False
     for j in range(_N_ROUNDS + 1):
@@ -390,14 +391,10 @@ def refine(
         flown_path(x0, rows, weights, g, tof, N_NODES, flown)
         for i in range(N_NODES):
             for j in range(6):
-                path[j * N_NODES + i] += _DAMPING * (
-                    flown[j * N_NODES + i] - path[j * N_NODES + i]
-                )
+                path[j * STRIDE + i] += _DAMPING * (flown[j * STRIDE + i] - path[j * STRIDE + i])
         if not gauss_rows(path, tof, N_NODES, rows, anomaly):
             return True
-        value = smallest_impulse(
-            rows, d, ve, value, N_NODES, int(_NEXT_STEPS), p, weights, g, c, m
-        )
+        value = smallest_impulse(rows, d, ve, value, N_NODES, int(_NEXT_STEPS), p, weights, g, c)
         if not 0.0 < value < SATURATED:
             return True
         for j in range(k, _N_ROUNDS + 1):
@@ -435,23 +432,23 @@ def thrust_directions(path_work: PathWork, base: float, out: _Array) -> None:
 
     Where it nearly vanishes the thrust turns; where it points the thrust points.
     """
-    _, _, _, weights, g, c, _, _, _ = path_work
+    _, _, _, weights, g, c, _, _ = path_work
     average = 0.0
     smallest = np.inf
     largest_use = 0.0
     for i in range(N_NODES):
-        average += g[3 * N_NODES + i] / N_NODES
-        smallest = min(smallest, g[3 * N_NODES + i])
-        largest_use = max(largest_use, weights[i] * g[3 * N_NODES + i] / c[i])
+        average += g[3 * STRIDE + i] / N_NODES
+        smallest = min(smallest, g[3 * STRIDE + i])
+        largest_use = max(largest_use, weights[i] * g[3 * STRIDE + i] / c[i])
     out[0] = smallest / average
     out[1] = clip(math.log(largest_use) - base, -1.0, 1.0)
     o = 2
     for k in range(5):
         i = (0, 5, 10, 14, 19)[k]
-        length = max(g[3 * N_NODES + i], 1e-12 * average)
+        length = max(g[3 * STRIDE + i], 1e-12 * average)
         out[o] = g[i] / length
-        out[o + 1] = g[N_NODES + i] / length
-        out[o + 2] = g[2 * N_NODES + i] / length
+        out[o + 1] = g[STRIDE + i] / length
+        out[o + 2] = g[2 * STRIDE + i] / length
         out[o + 3] = clip(length / average, 0.0, 4.0)
         o += 4
 
@@ -487,7 +484,7 @@ def leg_features(
     """
     path_work, (s0, s1, x0, x1, state), lambert_work, hint_work = work
     lam, branch, flown, z_first, z, z_lambert = hint_work
-    path, rows, p, weights, g, c, m, d, anomaly = path_work
+    path, rows, p, weights, g, c, d, anomaly = path_work
     for j in range(N_FEATURES):
         out[j] = np.nan
     a = to_frame(rv_dep, rv_arr, mu, s0, s1)
@@ -510,7 +507,7 @@ def leg_features(
         first_path(x0, x1, tof, excess, least_motion(q), N_NODES, path)
         if not gauss_rows(path, tof, N_NODES, rows, anomaly):
             continue
-        value = smallest_impulse(rows, d, ve, 0.0, N_NODES, int(1), p, weights, g, c, m)
+        value = smallest_impulse(rows, d, ve, 0.0, N_NODES, int(1), p, weights, g, c)
         if not 0.0 < value < SATURATED:
             continue
         z_first[q] = value
@@ -577,7 +574,7 @@ def feature_workspace() -> FeatureWork:
         (
             np.empty(2 * (MAX_REVS + 1)),
             np.empty(MAX_REVS + 1, np.int64),
-            np.empty(6 * N_NODES),
+            np.empty(6 * STRIDE),
             np.empty(_N_COUNTS),
             np.empty(2 * (_N_ROUNDS + 1)),
             np.empty(MAX_REVS + 1),
@@ -611,7 +608,10 @@ def quick_batch(
     out: _Array,
     hint: _Array,
 ) -> None:
-    """Write features (n, N_QUICK) and log hints (n,) of n legs; see `quick_features`."""
+    """Write features (n, N_QUICK) and log hints (n,) of n legs, one after the other.
+
+    See `quick_features`; `lanes.rendezvous_kernels` does the same faster, and is compared with it.
+    """
     work = feature_workspace()
     for i in range(len(tof_s)):
         hint[i] = quick_features(rv_dep[i], rv_arr[i], tof_s[i], exhaust[i], mu, work, out[i])

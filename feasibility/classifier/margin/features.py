@@ -99,11 +99,11 @@ def margin_features(legs: Legs) -> tuple[_Array, _Array]:
 
 def quick_features(legs: Legs) -> tuple[_Array, _Array]:
     """Return `QUICK_FEATURES` (n, 40) and a rough hint (n,); otherwise as `margin_features`."""
-    from feasibility.classifier.margin import feature_kernels
+    from feasibility.classifier.margin.lanes import rendezvous_kernels
 
-    X = np.empty((len(legs), feature_kernels.N_QUICK))
+    X = np.empty((len(legs), rendezvous_kernels.N_QUICK))
     hint = np.empty(len(legs))
-    feature_kernels.quick_batch(*_arguments(legs), X, hint)
+    rendezvous_kernels.quick_lane_batch(*_arguments(legs), X, hint)
     return X, _of_rendezvous(legs, hint)
 
 

@@ -49,6 +49,7 @@ from feasibility.classifier.margin.free_path_kernels import (
 from feasibility.classifier.margin.path_kernels import (
     N_NODES,
     SATURATED,
+    STRIDE,
     duals,
     impulse_effects,
 )
@@ -116,13 +117,13 @@ def dual_features(
     Its size beside that of the segments, how much of the work the excess does, and the cosine
     of the angle to the excess: 1 at the optimum. The path in `feature_work` is spoilt.
     """
-    (path, rows, p, _, g, _, _, _, anomaly), (s0, s1, x0, x1, _), _, _ = feature_work
+    (path, rows, p, _, g, _, _, anomaly), (s0, s1, x0, x1, _), _, _ = feature_work
     average = 0.0
     for i in range(N_NODES):
-        average += g[3 * N_NODES + i] / N_NODES
+        average += g[3 * STRIDE + i] / N_NODES
     for j in range(6):
-        path[j * N_NODES] = x0[j]
-        path[j * N_NODES + 1] = x1[j]
+        path[j * STRIDE] = x0[j]
+        path[j * STRIDE + 1] = x1[j]
     anomaly[0] = tof
     anomaly[1] = 0.0
     for j in range(N_DUALS):
@@ -139,10 +140,10 @@ def dual_features(
             size += excess[end, j] ** 2
             u = 0.0
             for k in range(3):
-                u += axes[k, j] * g[k * N_NODES + end]
+                u += axes[k, j] * g[k * STRIDE + end]
             along += u * excess[end, j]
         size = math.sqrt(size)
-        dual = g[3 * N_NODES + end]
+        dual = g[3 * STRIDE + end]
         sign = 1.0 if end == 0 else -1.0
         o = 3 * end
         out[o] = min(dual / average, 4.0)
@@ -363,7 +364,7 @@ def free_quick_features(
     and result as for `free_leg_features`.
     """
     path_work, ends, elements, _, _, _, _, over, _, _, _, _ = ends_work
-    _, _, p, weights, g, _, _, d, _ = path_work
+    _, _, p, weights, g, _, d, _ = path_work
     states, axes, _ = scratch
     s0, s1, m0, m1, scaled = states[0], states[1], states[2], states[3], states[4]
     for j in range(N_FREE_QUICK):
@@ -412,7 +413,7 @@ def free_quick_features(
         )
         o += N_END
     for end in range(2):
-        impulse = weights[QUICK_SEGMENTS + end] * g[3 * N_NODES + QUICK_SEGMENTS + end]
+        impulse = weights[QUICK_SEGMENTS + end] * g[3 * STRIDE + QUICK_SEGMENTS + end]
         out[o + end] = min(impulse / (impulse + z * QUICK_SEGMENTS), 1.0)
     out[o + 2] = clip(math.log(max(total / unit, 1e-12)) - base, -1.5, 1.5)
     out[o + 3] = log_ratio(max(over[0] / unit, 1e-12), base)

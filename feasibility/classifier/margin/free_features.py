@@ -100,11 +100,11 @@ def features_and_excess(legs: Legs) -> tuple[_Array, _Array, _Array]:
 
 def quick_free_features(legs: Legs) -> tuple[_Array, _Array]:
     """Return `FREE_QUICK_FEATURES` (n, k) and a rough hint (n,); otherwise as `free_features`."""
-    from feasibility.classifier.margin import free_feature_kernels
+    from feasibility.classifier.margin.lanes import free_kernels
 
-    X = np.empty((len(legs), free_feature_kernels.N_FREE_QUICK))
+    X = np.empty((len(legs), free_kernels.N_FREE_QUICK))
     hint = np.empty(len(legs))
-    free_feature_kernels.free_quick_batch(*_arguments(legs), X, hint)
+    free_kernels.free_quick_lane_batch(*_arguments(legs), X, hint)
     return X, hint
 
 

@@ -31,8 +31,8 @@ from numpy.typing import NDArray
 
 from feasibility.classifier.margin.feature_kernels import MAX_REVS, add_impulse
 from feasibility.classifier.margin.path_kernels import (
-    N_NODES,
     SATURATED,
+    STRIDE,
     PathWork,
     balanced_impulse,
     duals,
@@ -158,15 +158,15 @@ def weigh(
     """Write the weights of the segments and of both ends, bounded where a dual nearly vanishes."""
     mean = 0.0
     for i in range(segments):
-        mean += g[3 * N_NODES + i]
+        mean += g[3 * STRIDE + i]
     mean /= segments
     for i in range(segments):
-        weights[i] = z * c[i] / max(g[3 * N_NODES + i], 0.02 * mean)
+        weights[i] = z * c[i] / max(g[3 * STRIDE + i], 0.02 * mean)
     stiff = _STIFF * z / mean
     for end in range(2):
         i = segments + end
         bound = dep if end == 0 else arr
-        weights[i] = min(bound / max(g[3 * N_NODES + i], 1e-30), stiff)
+        weights[i] = min(bound / max(g[3 * STRIDE + i], 1e-30), stiff)
 
 
 @inner_kernel
@@ -188,20 +188,20 @@ def bounded_impulse(
 
     The weights of the first step are given. 0 where the problem is singular.
     """
-    _, rows, p, weights, g, c, m, d, _ = path_work
+    _, rows, p, weights, g, c, d, _ = path_work
     z = 0.0
     for step in range(steps):
-        if not weighted_solve(rows, weights, d, segments + 2, m, p):
+        if not weighted_solve(rows, weights, d, segments + 2, p):
             return 0.0
         duals(rows, p, segments + 2, g)
         own = 0.0
         for i in range(segments):
-            own += weights[i] * g[3 * N_NODES + i] ** 2
+            own += weights[i] * g[3 * STRIDE + i] ** 2
         value = own
         for end in range(2):
             bound = dep if end == 0 else arr
             if bound < np.inf:
-                size = g[3 * N_NODES + segments + end]
+                size = g[3 * STRIDE + segments + end]
                 value += (weights[segments + end] * size - bound) * size
         if not own > 0.0:
             return 0.0
@@ -225,7 +225,7 @@ def read_excess(end: int, bound: float, own: _Array, segments: int, work: EndsWo
     for j in range(3):
         u = 0.0
         for k in range(3):
-            u += local[k, j] * g[k * N_NODES + i]
+            u += local[k, j] * g[k * STRIDE + i]
         excess[j] = scale * u
         if bound == np.inf:
             excess[j] += state[3 + j] - own[3 + j]
@@ -247,7 +247,7 @@ def move_part(own: _Array, state: _Array, excess: _Array) -> None:
 @inner_kernel
 def lay_rows(tof: float, segments: int, path_work: PathWork) -> bool:
     """Write the rows of the segments and both ends; return False off the ellipses."""
-    path, rows, _, _, _, _, _, _, anomaly = path_work
+    path, rows, _, _, _, _, _, anomaly = path_work
     for i in range(segments):
         anomaly[i] = tof * (1.0 - (i + 0.5) / segments)
     anomaly[segments] = tof
@@ -277,10 +277,10 @@ def lay_problem(
     path_work: PathWork,
 ) -> bool:
     """Write rows and d of the path, between the ends laid; return False off the ellipses."""
-    path, rows, _, _, _, _, _, d, _ = path_work
+    path, rows, _, _, _, _, d, _ = path_work
     for end in range(2):
         for j in range(6):
-            path[j * N_NODES + segments + end] = elements[end, j]
+            path[j * STRIDE + segments + end] = elements[end, j]
     if not lay_rows(tof, segments, path_work):
         return False
     for j in range(5):
@@ -301,7 +301,7 @@ def lay_lambert(
 ) -> bool:
     """Write path, rows and d of a Lambert arc; return whether there is one, and an ellipse."""
     path_work, ends, elements, _, _, v1, v2, _, _, _, _, _ = work
-    path, rows, _, _, _, _, _, d, _ = path_work
+    path, rows, _, _, _, _, d, _ = path_work
     if math.isnan(v1[b, 0]):
         return False
     for j in range(3):
@@ -312,11 +312,11 @@ def lay_lambert(
         return False
     for i in range(_NODES):
         for j in range(5):
-            path[j * N_NODES + i] = x[j]
+            path[j * STRIDE + i] = x[j]
     for i in range(SEGMENTS):
-        path[5 * N_NODES + i] = x[5] + x[0] * tof * (i + 0.5) / SEGMENTS
-    path[5 * N_NODES + _DEP] = x[5]
-    path[5 * N_NODES + _ARR] = x[5] + x[0] * tof
+        path[5 * STRIDE + i] = x[5] + x[0] * tof * (i + 0.5) / SEGMENTS
+    path[5 * STRIDE + _DEP] = x[5]
+    path[5 * STRIDE + _ARR] = x[5] + x[0] * tof
     if not lay_rows(tof, int(SEGMENTS), path_work):
         return False
     for j in range(6):
@@ -443,7 +443,7 @@ def pursue(
     the best z so far. `z_rounds` holds the z of each round.
     """
     path_work, ends, elements, flown, _, _, _, over, z_rounds, _, _, _ = work
-    path, rows, p, weights, g, c, _, _, _ = path_work
+    path, rows, p, weights, g, c, _, _ = path_work
     before = ends[5:]
     if not lay_start(q, s0, s1, tof, dep, arr, work):
         return SATURATED
@@ -474,13 +474,11 @@ def pursue(
         if not bound_path:
             flown_path(elements[0], rows, weights, g, tof, int(SEGMENTS), flown)
         last = SEGMENTS - 1
-        longitude = flown[5 * N_NODES + last] + 0.5 * tof / SEGMENTS * flown[last]
+        longitude = flown[5 * STRIDE + last] + 0.5 * tof / SEGMENTS * flown[last]
         elements[1, 5] += _TWO_PI * np.rint((longitude - elements[1, 5]) / _TWO_PI)
         for i in range(SEGMENTS):
             for j in range(6):
-                path[j * N_NODES + i] += _DAMPING * (
-                    flown[j * N_NODES + i] - path[j * N_NODES + i]
-                )
+                path[j * STRIDE + i] += _DAMPING * (flown[j * STRIDE + i] - path[j * STRIDE + i])
         if not lay_problem(tof, dep, arr, int(SEGMENTS), ends, elements, path_work):
             return z if k > _NEEDED_ROUNDS else SATURATED
         duals(rows, p, _NODES, g)
@@ -555,7 +553,7 @@ def ends_workspace() -> EndsWork:
         workspace(),
         np.zeros((7, 6)),
         np.empty((2, 6)),
-        np.empty(6 * N_NODES),
+        np.empty(6 * STRIDE),
         np.empty((3, 3)),
         np.empty((BRANCHES, 3)),
         np.empty((BRANCHES, 3)),

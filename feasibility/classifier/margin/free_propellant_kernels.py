@@ -28,8 +28,8 @@ from feasibility.classifier.margin.free_path_kernels import (
     weigh_alike,
 )
 from feasibility.classifier.margin.path_kernels import (
-    N_NODES,
     SATURATED,
+    STRIDE,
     PathWork,
     duals,
     first_path,
@@ -67,28 +67,28 @@ def least_bounded_impulses(
     `push` is the impulse of a segment at full thrust and initial mass; the weights of the first
     step are given. `bound` (SEGMENTS,) receives the impulses at full thrust.
     """
-    _, rows, p, weights, g, _, m, d, _ = path_work
+    _, rows, p, weights, g, _, d, _ = path_work
     total = SATURATED
     for step in range(steps):
-        if not weighted_solve(rows, weights, d, int(SEGMENTS + 2), m, p):
+        if not weighted_solve(rows, weights, d, int(SEGMENTS + 2), p):
             return SATURATED
         duals(rows, p, int(SEGMENTS + 2), g)
         total = 0.0
         for i in range(SEGMENTS):
             if step == 0:
                 bound[i] = push * math.exp(min(total / ve, _MOST_BURNT))
-            total += weights[i] * g[3 * N_NODES + i]
+            total += weights[i] * g[3 * STRIDE + i]
         if step == steps - 1:
             break
         least = _LEAST_WEIGHT * total / SEGMENTS
         for i in range(SEGMENTS):
-            dual = g[3 * N_NODES + i] + 1e-9
+            dual = g[3 * STRIDE + i] + 1e-9
             weights[i] = max(min(weights[i] * dual * math.sqrt(dual), bound[i] / dual), least)
         stiff = _STIFF * max(total, 1e-12) / SEGMENTS
         for end in range(2):
             i = SEGMENTS + end
             limit = dep if end == 0 else arr
-            weights[i] = min(limit / max(g[3 * N_NODES + i], 1e-30), stiff)
+            weights[i] = min(limit / max(g[3 * STRIDE + i], 1e-30), stiff)
     return total
 
 
@@ -111,7 +111,7 @@ def follow(
     These are replaced by better ones. SATURATED where there is no path.
     """
     path_work, ends, elements, flown, _, _, _, _, _, _, _, _ = work
-    path, rows, _, weights, g, _, _, _, _ = path_work
+    path, rows, _, weights, g, _, _, _ = path_work
     before = ends[5:]
     if not lay_ends(s0, s1, ends, elements):
         return SATURATED
@@ -138,13 +138,11 @@ def follow(
             return SATURATED
         flown_path(elements[0], rows, weights, g, tof, int(SEGMENTS), flown)
         last = SEGMENTS - 1
-        longitude = flown[5 * N_NODES + last] + 0.5 * tof / SEGMENTS * flown[last]
+        longitude = flown[5 * STRIDE + last] + 0.5 * tof / SEGMENTS * flown[last]
         elements[1, 5] += _TWO_PI * np.rint((longitude - elements[1, 5]) / _TWO_PI)
         for i in range(SEGMENTS):
             for j in range(6):
-                path[j * N_NODES + i] += _DAMPING * (
-                    flown[j * N_NODES + i] - path[j * N_NODES + i]
-                )
+                path[j * STRIDE + i] += _DAMPING * (flown[j * STRIDE + i] - path[j * STRIDE + i])
         if not lay_problem(tof, dep, arr, int(SEGMENTS), ends, elements, path_work):
             return SATURATED
         total = least_bounded_impulses(ve, push, dep, arr, int(_NEXT_STEPS), bound, path_work)

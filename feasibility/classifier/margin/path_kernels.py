@@ -30,13 +30,17 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.runtime.jit import inner_kernel, kernel, summing_kernel
+from feasibility.classifier.margin.lanes.math_kernels import inverse_cube_root
+from feasibility.runtime.jit import inner_kernel, kernel, lane_function, summing_kernel
 
 _Array = NDArray[np.float64]
-PathWork = tuple[_Array, _Array, _Array, _Array, _Array, _Array, _Array, _Array, _Array]
+PathWork = tuple[_Array, _Array, _Array, _Array, _Array, _Array, _Array, _Array]
 
 N_NODES = 20
 """Segments, as many as the legs have whose maximum initial mass is to be estimated."""
+
+STRIDE = 24
+"""Places for the nodes of a path in an array: a multiple of what vectors hold."""
 
 SATURATED = 1e3
 """Stands for an impulse of a segment that is beyond all use, or cannot be estimated."""
@@ -47,9 +51,10 @@ _HALF_PI_TAIL = 6.077100506506192e-11
 _ROUND = 1.5 * 2.0**52
 _LEAST_MOTION = 0.15
 _LARGEST_ECCENTRICITY2 = 0.9**2
+_SINGULAR = 1e-14
 
 
-@kernel
+@lane_function
 def sine_cosine(x: float) -> tuple[float, float]:
     """Return sine and cosine to 1e-13, in arithmetic alone, so that a loop becomes vectors.
 
@@ -59,10 +64,13 @@ def sine_cosine(x: float) -> tuple[float, float]:
     quarter = (x * _TWO_OVER_PI + _ROUND) - _ROUND
     r = (x - quarter * _HALF_PI_HEAD) - quarter * _HALF_PI_TAIL
     z = r * r
-    s = 1.0 / 362880.0 - z * (1.0 / 39916800.0 - z * (1.0 / 6227020800.0))
-    s = r * (1.0 - z * (1.0 / 6.0 - z * (1.0 / 120.0 - z * (1.0 / 5040.0 - z * s))))
-    c = 1.0 / 40320.0 - z * (1.0 / 3628800.0 - z * (1.0 / 479001600.0))
-    c = 1.0 - z * (0.5 - z * (1.0 / 24.0 - z * (1.0 / 720.0 - z * c)))
+    # Pairs of terms, not one after the other, as each waits for the one before.
+    z2 = z * z
+    s = (1.0 / 362880.0 - z * (1.0 / 39916800.0)) + z2 * (1.0 / 6227020800.0)
+    s = (1.0 - z * (1.0 / 6.0)) + z2 * ((1.0 / 120.0 - z * (1.0 / 5040.0)) + z2 * s)
+    s *= r
+    c = (1.0 / 40320.0 - z * (1.0 / 3628800.0)) + z2 * (1.0 / 479001600.0)
+    c = (1.0 - z * 0.5) + z2 * ((1.0 / 24.0 - z * (1.0 / 720.0)) + z2 * c)
     # Which quarter, from -2 to 2.
     place = quarter - 4.0 * ((0.25 * quarter + _ROUND) - _ROUND)
     odd = abs(place) == 1.0
@@ -74,7 +82,13 @@ def sine_cosine(x: float) -> tuple[float, float]:
     return sine, cosine
 
 
-@kernel
+@lane_function
+def whole_vectors(nodes: int) -> int:
+    """Return how many nodes fill vectors of eight, so that a loop over them has no rest."""
+    return min((nodes + 7) >> 3, STRIDE >> 3) << 3
+
+
+@summing_kernel
 def impulse_effects(path: _Array, nodes: int, rows: _Array, anomaly: _Array) -> bool:
     """Write the 13 entries of C that are not zero, for each node; return False off the ellipses.
 
@@ -82,58 +96,63 @@ def impulse_effects(path: _Array, nodes: int, rows: _Array, anomaly: _Array) -> 
 
     Parameters
     ----------
-    path : (6 N_NODES,) float64
+    path : (6 STRIDE,) float64
         n, ex, ey, h, k and mean longitude of the nodes.
     nodes : int
         How many there are.
-    rows : (13 N_NODES,) float64
+    rows : (13 STRIDE,) float64
         Overwritten by the effects of a radial, transverse and normal impulse: n by r and t;
         ex, ey by r, t and n; h by n; k by n; l by r, t and n.
-    anomaly : (6 N_NODES,) float64
+    anomaly : (6 STRIDE,) float64
         First the time that remains to arrival, the rest is scratch.
     """
-    for i in range(nodes):
-        ex, ey = path[N_NODES + i], path[2 * N_NODES + i]
+    padded = whole_vectors(nodes)
+    for i in range(nodes, padded):
+        for j in range(6):
+            path[j * STRIDE + i] = path[j * STRIDE]
+        anomaly[i] = anomaly[0]
+    for i in range(padded):
+        ex, ey = path[STRIDE + i], path[2 * STRIDE + i]
         if not (path[i] > _LEAST_MOTION and ex * ex + ey * ey < _LARGEST_ECCENTRICITY2):
             return False
-    for i in range(nodes):
-        anomaly[N_NODES + i] = 1.0 / np.cbrt(path[i])
+    for i in range(padded):
+        anomaly[STRIDE + i] = inverse_cube_root(path[i])
     # Kepler's equation l = F - ex sin F + ey cos F; the derivatives vanish nowhere (e < 1).
-    for i in range(nodes):
-        ex, ey, longitude = path[N_NODES + i], path[2 * N_NODES + i], path[5 * N_NODES + i]
+    for i in range(padded):
+        ex, ey, longitude = path[STRIDE + i], path[2 * STRIDE + i], path[5 * STRIDE + i]
         s, c = sine_cosine(longitude)
         # Halley's step from the mean longitude: mostly one more is enough.
         slope, curve = 1.0 - ex * c - ey * s, ex * s - ey * c
-        anomaly[2 * N_NODES + i] = longitude + curve / (slope + 0.5 * curve * curve / slope)
-    for i in range(nodes):
-        s, c = sine_cosine(anomaly[2 * N_NODES + i])
-        anomaly[3 * N_NODES + i] = s
-        anomaly[4 * N_NODES + i] = c
+        anomaly[2 * STRIDE + i] = longitude + curve / (slope + 0.5 * curve * curve / slope)
+    for i in range(padded):
+        s, c = sine_cosine(anomaly[2 * STRIDE + i])
+        anomaly[3 * STRIDE + i] = s
+        anomaly[4 * STRIDE + i] = c
     for _ in range(12):
-        for i in range(nodes):
-            ex, ey = path[N_NODES + i], path[2 * N_NODES + i]
-            s, c = anomaly[3 * N_NODES + i], anomaly[4 * N_NODES + i]
+        for i in range(padded):
+            ex, ey = path[STRIDE + i], path[2 * STRIDE + i]
+            s, c = anomaly[3 * STRIDE + i], anomaly[4 * STRIDE + i]
             slope = 1.0 - ex * c - ey * s
             curve = ex * s - ey * c
-            gap = anomaly[2 * N_NODES + i] - curve - path[5 * N_NODES + i]
+            gap = anomaly[2 * STRIDE + i] - curve - path[5 * STRIDE + i]
             newton = gap / slope
             step = min(1.0, max(-1.0, gap / (slope - 0.5 * newton * curve)))
-            anomaly[2 * N_NODES + i] -= step
-            anomaly[5 * N_NODES + i] = step
-        for i in range(nodes):
-            s, c = sine_cosine(anomaly[2 * N_NODES + i])
-            anomaly[3 * N_NODES + i] = s
-            anomaly[4 * N_NODES + i] = c
+            anomaly[2 * STRIDE + i] -= step
+            anomaly[5 * STRIDE + i] = step
+        for i in range(padded):
+            s, c = sine_cosine(anomaly[2 * STRIDE + i])
+            anomaly[3 * STRIDE + i] = s
+            anomaly[4 * STRIDE + i] = c
         largest = 0.0
-        for i in range(nodes):
-            largest = max(largest, abs(anomaly[5 * N_NODES + i]))
+        for i in range(padded):
+            largest = max(largest, abs(anomaly[5 * STRIDE + i]))
         if largest < 1e-3:
             break
-    for i in range(nodes):
-        n, ex, ey = path[i], path[N_NODES + i], path[2 * N_NODES + i]
-        h, k = path[3 * N_NODES + i], path[4 * N_NODES + i]
-        remaining, root_a = anomaly[i], anomaly[N_NODES + i]
-        s, c = anomaly[3 * N_NODES + i], anomaly[4 * N_NODES + i]
+    for i in range(padded):
+        n, ex, ey = path[i], path[STRIDE + i], path[2 * STRIDE + i]
+        h, k = path[3 * STRIDE + i], path[4 * STRIDE + i]
+        remaining, root_a = anomaly[i], anomaly[STRIDE + i]
+        s, c = anomaly[3 * STRIDE + i], anomaly[4 * STRIDE + i]
         eta = math.sqrt(1.0 - ex * ex - ey * ey)
         b = 1.0 / (1.0 + eta)
         a = root_a * root_a
@@ -151,19 +170,19 @@ def impulse_effects(path: _Array, nodes: int, rows: _Array, anomaly: _Array) -> 
         n_r = change_n * sigma
         n_t = change_n * w
         rows[i] = n_r
-        rows[N_NODES + i] = n_t
-        rows[2 * N_NODES + i] = root * sin_l
-        rows[3 * N_NODES + i] = over * ((w + 1.0) * cos_l + ex)
-        rows[4 * N_NODES + i] = -over * chi * ey
-        rows[5 * N_NODES + i] = -root * cos_l
-        rows[6 * N_NODES + i] = over * ((w + 1.0) * sin_l + ey)
-        rows[7 * N_NODES + i] = over * chi * ex
+        rows[STRIDE + i] = n_t
+        rows[2 * STRIDE + i] = root * sin_l
+        rows[3 * STRIDE + i] = over * ((w + 1.0) * cos_l + ex)
+        rows[4 * STRIDE + i] = -over * chi * ey
+        rows[5 * STRIDE + i] = -root * cos_l
+        rows[6 * STRIDE + i] = over * ((w + 1.0) * sin_l + ey)
+        rows[7 * STRIDE + i] = over * chi * ex
         tilt = 0.5 * over * (1.0 + h * h + k * k)
-        rows[8 * N_NODES + i] = tilt * cos_l
-        rows[9 * N_NODES + i] = tilt * sin_l
-        rows[10 * N_NODES + i] = -(p * (w - 1.0) * b + 2.0 * eta * r) / root + remaining * n_r
-        rows[11 * N_NODES + i] = (p + r) * sigma * b / root + remaining * n_t
-        rows[12 * N_NODES + i] = over * chi
+        rows[8 * STRIDE + i] = tilt * cos_l
+        rows[9 * STRIDE + i] = tilt * sin_l
+        rows[10 * STRIDE + i] = -(p * (w - 1.0) * b + 2.0 * eta * r) / root + remaining * n_r
+        rows[11 * STRIDE + i] = (p + r) * sigma * b / root + remaining * n_t
+        rows[12 * STRIDE + i] = over * chi
     return True
 
 
@@ -180,12 +199,12 @@ def first_path(
     """
     n0, n1 = x0[0], x1[0]
     bound = least * min(n0, n1)
-    for i in range(nodes):
+    for i in range(min(nodes, STRIDE)):
         s = (i + 0.5) / nodes
         path[i] = max(n0 + (n1 - n0) * s + 6.0 * excess / tof * s * (1.0 - s), bound)
         for j in range(1, 5):
-            path[j * N_NODES + i] = x0[j] + (x1[j] - x0[j]) * s
-        path[5 * N_NODES + i] = (
+            path[j * STRIDE + i] = x0[j] + (x1[j] - x0[j]) * s
+        path[5 * STRIDE + i] = (
             x0[5] + tof * s * (n0 + 0.5 * (n1 - n0) * s) + excess * s * s * (3 - 2 * s)
         )
 
@@ -193,7 +212,7 @@ def first_path(
 @inner_kernel
 def gauss_rows(path: _Array, tof: float, nodes: int, rows: _Array, anomaly: _Array) -> bool:
     """Write the rows of all nodes of a path; return False if it leaves the ellipses."""
-    for i in range(nodes):
+    for i in range(min(nodes, STRIDE)):
         anomaly[i] = tof * (1.0 - (i + 0.5) / nodes)
     return impulse_effects(path, nodes, rows, anomaly)
 
@@ -201,120 +220,124 @@ def gauss_rows(path: _Array, tof: float, nodes: int, rows: _Array, anomaly: _Arr
 @inner_kernel
 def duals(rows: _Array, p: _Array, nodes: int, g: _Array) -> None:
     """Write C_i^T p and its length, (4,) a node."""
-    for i in range(nodes):
+    padded = whole_vectors(nodes)
+    for i in range(padded):
         g0 = (
             rows[i] * p[0]
-            + rows[2 * N_NODES + i] * p[1]
-            + rows[5 * N_NODES + i] * p[2]
-            + rows[10 * N_NODES + i] * p[5]
+            + rows[2 * STRIDE + i] * p[1]
+            + rows[5 * STRIDE + i] * p[2]
+            + rows[10 * STRIDE + i] * p[5]
         )
         g1 = (
-            rows[N_NODES + i] * p[0]
-            + rows[3 * N_NODES + i] * p[1]
-            + rows[6 * N_NODES + i] * p[2]
-            + rows[11 * N_NODES + i] * p[5]
+            rows[STRIDE + i] * p[0]
+            + rows[3 * STRIDE + i] * p[1]
+            + rows[6 * STRIDE + i] * p[2]
+            + rows[11 * STRIDE + i] * p[5]
         )
         g2 = (
-            rows[4 * N_NODES + i] * p[1]
-            + rows[7 * N_NODES + i] * p[2]
-            + rows[8 * N_NODES + i] * p[3]
-            + rows[9 * N_NODES + i] * p[4]
-            + rows[12 * N_NODES + i] * p[5]
+            rows[4 * STRIDE + i] * p[1]
+            + rows[7 * STRIDE + i] * p[2]
+            + rows[8 * STRIDE + i] * p[3]
+            + rows[9 * STRIDE + i] * p[4]
+            + rows[12 * STRIDE + i] * p[5]
         )
         g[i] = g0
-        g[N_NODES + i] = g1
-        g[2 * N_NODES + i] = g2
-        g[3 * N_NODES + i] = math.sqrt(g0 * g0 + g1 * g1 + g2 * g2)
+        g[STRIDE + i] = g1
+        g[2 * STRIDE + i] = g2
+        g[3 * STRIDE + i] = math.sqrt(g0 * g0 + g1 * g1 + g2 * g2)
 
 
 @summing_kernel
-def weighted_solve(
-    rows: _Array, weights: _Array, d: _Array, nodes: int, m: _Array, p: _Array
-) -> bool:
-    """Write p with (sum_i w_i C_i C_i^T) p = d; return False if the matrix is singular.
-
-    Parameters
-    ----------
-    m : (6, 6) float64
-        Overwritten by the Cholesky factor.
-    """
+def weighted_solve(rows: _Array, weights: _Array, d: _Array, nodes: int, p: _Array) -> bool:
+    """Write p with (sum_i w_i C_i C_i^T) p = d; return False if the matrix is singular."""
     g00 = g01 = g02 = g05 = g11 = g12 = g13 = g14 = g15 = 0.0
     g22 = g23 = g24 = g25 = g33 = g34 = g35 = g44 = g45 = g55 = 0.0
-    for i in range(nodes):
+    padded = whole_vectors(nodes)
+    for i in range(nodes, padded):
+        weights[i] = 0.0
+    for i in range(padded):
         w = weights[i]
-        n0, n1 = w * rows[i], w * rows[N_NODES + i]
+        n0, n1 = w * rows[i], w * rows[STRIDE + i]
         a0, a1, a2 = (
-            w * rows[2 * N_NODES + i],
-            w * rows[3 * N_NODES + i],
-            w * rows[4 * N_NODES + i],
+            w * rows[2 * STRIDE + i],
+            w * rows[3 * STRIDE + i],
+            w * rows[4 * STRIDE + i],
         )
         b0, b1, b2 = (
-            w * rows[5 * N_NODES + i],
-            w * rows[6 * N_NODES + i],
-            w * rows[7 * N_NODES + i],
+            w * rows[5 * STRIDE + i],
+            w * rows[6 * STRIDE + i],
+            w * rows[7 * STRIDE + i],
         )
         h2, k2, l2 = (
-            w * rows[8 * N_NODES + i],
-            w * rows[9 * N_NODES + i],
-            w * rows[12 * N_NODES + i],
+            w * rows[8 * STRIDE + i],
+            w * rows[9 * STRIDE + i],
+            w * rows[12 * STRIDE + i],
         )
-        g00 += n0 * rows[i] + n1 * rows[N_NODES + i]
-        g01 += n0 * rows[2 * N_NODES + i] + n1 * rows[3 * N_NODES + i]
-        g02 += n0 * rows[5 * N_NODES + i] + n1 * rows[6 * N_NODES + i]
-        g05 += n0 * rows[10 * N_NODES + i] + n1 * rows[11 * N_NODES + i]
-        g11 += a0 * rows[2 * N_NODES + i] + a1 * rows[3 * N_NODES + i] + a2 * rows[4 * N_NODES + i]
-        g12 += a0 * rows[5 * N_NODES + i] + a1 * rows[6 * N_NODES + i] + a2 * rows[7 * N_NODES + i]
-        g13 += a2 * rows[8 * N_NODES + i]
-        g14 += a2 * rows[9 * N_NODES + i]
-        g15 += (
-            a0 * rows[10 * N_NODES + i] + a1 * rows[11 * N_NODES + i] + a2 * rows[12 * N_NODES + i]
-        )
-        g22 += b0 * rows[5 * N_NODES + i] + b1 * rows[6 * N_NODES + i] + b2 * rows[7 * N_NODES + i]
-        g23 += b2 * rows[8 * N_NODES + i]
-        g24 += b2 * rows[9 * N_NODES + i]
-        g25 += (
-            b0 * rows[10 * N_NODES + i] + b1 * rows[11 * N_NODES + i] + b2 * rows[12 * N_NODES + i]
-        )
-        g33 += h2 * rows[8 * N_NODES + i]
-        g34 += h2 * rows[9 * N_NODES + i]
-        g35 += h2 * rows[12 * N_NODES + i]
-        g44 += k2 * rows[9 * N_NODES + i]
-        g45 += k2 * rows[12 * N_NODES + i]
+        g00 += n0 * rows[i] + n1 * rows[STRIDE + i]
+        g01 += n0 * rows[2 * STRIDE + i] + n1 * rows[3 * STRIDE + i]
+        g02 += n0 * rows[5 * STRIDE + i] + n1 * rows[6 * STRIDE + i]
+        g05 += n0 * rows[10 * STRIDE + i] + n1 * rows[11 * STRIDE + i]
+        g11 += a0 * rows[2 * STRIDE + i] + a1 * rows[3 * STRIDE + i] + a2 * rows[4 * STRIDE + i]
+        g12 += a0 * rows[5 * STRIDE + i] + a1 * rows[6 * STRIDE + i] + a2 * rows[7 * STRIDE + i]
+        g13 += a2 * rows[8 * STRIDE + i]
+        g14 += a2 * rows[9 * STRIDE + i]
+        g15 += a0 * rows[10 * STRIDE + i] + a1 * rows[11 * STRIDE + i] + a2 * rows[12 * STRIDE + i]
+        g22 += b0 * rows[5 * STRIDE + i] + b1 * rows[6 * STRIDE + i] + b2 * rows[7 * STRIDE + i]
+        g23 += b2 * rows[8 * STRIDE + i]
+        g24 += b2 * rows[9 * STRIDE + i]
+        g25 += b0 * rows[10 * STRIDE + i] + b1 * rows[11 * STRIDE + i] + b2 * rows[12 * STRIDE + i]
+        g33 += h2 * rows[8 * STRIDE + i]
+        g34 += h2 * rows[9 * STRIDE + i]
+        g35 += h2 * rows[12 * STRIDE + i]
+        g44 += k2 * rows[9 * STRIDE + i]
+        g45 += k2 * rows[12 * STRIDE + i]
         g55 += (
             w
             * (
-                rows[10 * N_NODES + i] * rows[10 * N_NODES + i]
-                + rows[11 * N_NODES + i] * rows[11 * N_NODES + i]
+                rows[10 * STRIDE + i] * rows[10 * STRIDE + i]
+                + rows[11 * STRIDE + i] * rows[11 * STRIDE + i]
             )
-            + l2 * rows[12 * N_NODES + i]
+            + l2 * rows[12 * STRIDE + i]
         )
-    m[0, 0], m[1, 0], m[2, 0], m[3, 0], m[4, 0], m[5, 0] = g00, g01, g02, 0.0, 0.0, g05
-    m[1, 1], m[2, 1], m[3, 1], m[4, 1], m[5, 1] = g11, g12, g13, g14, g15
-    m[2, 2], m[3, 2], m[4, 2], m[5, 2] = g22, g23, g24, g25
-    m[3, 3], m[4, 3], m[5, 3] = g33, g34, g35
-    m[4, 4], m[5, 4] = g44, g45
-    m[5, 5] = g55
-    for i in range(6):
-        for j in range(i + 1):
-            total = m[i, j]
-            for q in range(j):
-                total -= m[i, q] * m[j, q]
-            if i == j:
-                if not total > 1e-14 * m[i, i]:
-                    return False
-                m[i, i] = math.sqrt(total)
-            else:
-                m[i, j] = total / m[j, j]
-    for i in range(6):
-        total = d[i]
-        for q in range(i):
-            total -= m[i, q] * p[q]
-        p[i] = total / m[i, i]
-    for i in range(5, -1, -1):
-        total = p[i]
-        for q in range(i + 1, 6):
-            total -= m[q, i] * p[q]
-        p[i] = total / m[i, i]
+    # Cholesky's factors, written out; n is bound up with neither h nor k.
+    i0 = 1.0 / math.sqrt(g00)
+    l10, l20, l50 = g01 * i0, g02 * i0, g05 * i0
+    rest1 = g11 - l10 * l10
+    i1 = 1.0 / math.sqrt(rest1)
+    l21, l31, l41, l51 = (g12 - l20 * l10) * i1, g13 * i1, g14 * i1, (g15 - l50 * l10) * i1
+    rest2 = g22 - l20 * l20 - l21 * l21
+    i2 = 1.0 / math.sqrt(rest2)
+    l32, l42 = (g23 - l31 * l21) * i2, (g24 - l41 * l21) * i2
+    l52 = (g25 - l50 * l20 - l51 * l21) * i2
+    rest3 = g33 - l31 * l31 - l32 * l32
+    i3 = 1.0 / math.sqrt(rest3)
+    l43, l53 = (g34 - l41 * l31 - l42 * l32) * i3, (g35 - l51 * l31 - l52 * l32) * i3
+    rest4 = g44 - l41 * l41 - l42 * l42 - l43 * l43
+    i4 = 1.0 / math.sqrt(rest4)
+    l54 = (g45 - l51 * l41 - l52 * l42 - l53 * l43) * i4
+    rest5 = g55 - l50 * l50 - l51 * l51 - l52 * l52 - l53 * l53 - l54 * l54
+    i5 = 1.0 / math.sqrt(rest5)
+    if not (
+        g00 > 0.0
+        and rest1 > _SINGULAR * g11
+        and rest2 > _SINGULAR * g22
+        and rest3 > _SINGULAR * g33
+        and rest4 > _SINGULAR * g44
+        and rest5 > _SINGULAR * g55
+    ):
+        return False
+    p0 = d[0] * i0
+    p1 = (d[1] - l10 * p0) * i1
+    p2 = (d[2] - l20 * p0 - l21 * p1) * i2
+    p3 = (d[3] - l31 * p1 - l32 * p2) * i3
+    p4 = (d[4] - l41 * p1 - l42 * p2 - l43 * p3) * i4
+    p5 = (d[5] - l50 * p0 - l51 * p1 - l52 * p2 - l53 * p3 - l54 * p4) * i5 * i5
+    p4 = (p4 - l54 * p5) * i4
+    p3 = (p3 - l43 * p4 - l53 * p5) * i3
+    p2 = (p2 - l32 * p3 - l42 * p4 - l52 * p5) * i2
+    p1 = (p1 - l21 * p2 - l31 * p3 - l41 * p4 - l51 * p5) * i1
+    p0 = (p0 - l10 * p1 - l20 * p2 - l50 * p5) * i0
+    p[0], p[1], p[2], p[3], p[4], p[5] = p0, p1, p2, p3, p4, p5
     return True
 
 
@@ -327,6 +350,12 @@ def spent_segments(i: int, nodes: int) -> int:
     return i if 2 * i < nodes else i + 1
 
 
+@lane_function
+def spent_before(i: int, nodes: int) -> float:
+    """Return `spent_segments`, and of nodes that fill a vector no more than of the last one."""
+    return min(float(i) + (0.0 if 2 * i < nodes else 1.0), float(nodes))
+
+
 @summing_kernel
 def balanced_impulse(
     value: float, g: _Array, exhaust_velocity: float, nodes: int, c: _Array
@@ -335,23 +364,31 @@ def balanced_impulse(
 
     m_i = m_0 (1 - z k_i / v_e) after k_i segments at full thrust, to first order in one
     segment's propellant. The left side grows without bound as z approaches v_e / nodes,
-    where nothing is left of the spacecraft, so there is one solution: Newton from below.
+    where nothing is left of the spacecraft, so there is one solution, by Newton's method.
     """
-    total = 0.0
-    for i in range(nodes):
-        total += g[3 * N_NODES + i]
+    padded = whole_vectors(nodes)
+    total, late = 0.0, 0.0
+    for i in range(padded):
+        dual = g[3 * STRIDE + i] if i < nodes else 0.0
+        total += dual
+        late += spent_before(i, nodes) * dual
     largest = (1.0 - 1e-3) * exhaust_velocity / nodes
-    # With every mass the initial one z is too large, with every mass the final one too small.
-    z = value / total
-    z = min(z / (1.0 + z * nodes / exhaust_velocity), largest)
+    # As if all propellant were spent at once, at the mean time: nearly right, and a bit too much.
+    # As if at once at the start it is too little, from where Newton never fails.
+    least = value / total
+    z = exhaust_velocity * least / (exhaust_velocity + late * least / total)
+    if not z * nodes < 0.5 * exhaust_velocity:
+        z = min(least / (1.0 + least * nodes / exhaust_velocity), largest)
     for _ in range(6):
         total = 0.0
         slope = 0.0
-        for i in range(nodes):
-            ratio = 1.0 / (1.0 - z * spent_segments(i, nodes) / exhaust_velocity)
+        used = z / exhaust_velocity
+        for i in range(padded):
+            dual = g[3 * STRIDE + i] if i < nodes else 0.0
+            ratio = 1.0 / (1.0 - used * spent_before(i, nodes))
             c[i] = ratio
-            total += ratio * g[3 * N_NODES + i]
-            slope += ratio * ratio * g[3 * N_NODES + i]
+            total += ratio * dual
+            slope += ratio * ratio * dual
         gap = value - z * total
         if abs(gap) <= 1e-6 * value or z >= largest:
             break
@@ -371,7 +408,6 @@ def smallest_impulse(
     weights: _Array,
     g: _Array,
     c: _Array,
-    m: _Array,
 ) -> float:
     """Return z: the least impulse of the first segment with which the path can be followed.
 
@@ -379,14 +415,14 @@ def smallest_impulse(
     the problem is singular. `weights` and `g` hold the impulses w_i g_i afterwards.
     """
     if z == 0.0:
-        for i in range(nodes):
+        for i in range(min(nodes, STRIDE)):
             weights[i] = 1.0
             c[i] = 1.0
     else:
         duals(rows, p, nodes, g)
         reweight(g, c, nodes, weights)
     for step in range(steps):
-        if not weighted_solve(rows, weights, d, nodes, m, p):
+        if not weighted_solve(rows, weights, d, nodes, p):
             return 0.0
         duals(rows, p, nodes, g)
         value = 0.0
@@ -404,11 +440,11 @@ def smallest_impulse(
 def reweight(g: _Array, c: _Array, nodes: int, weights: _Array) -> None:
     """Write weights c_i / |g_i|, bounded where a dual nearly vanishes."""
     mean = 0.0
-    for i in range(nodes):
-        mean += g[3 * N_NODES + i]
+    for i in range(min(nodes, STRIDE)):
+        mean += g[3 * STRIDE + i]
     least = 0.02 * mean / nodes
-    for i in range(nodes):
-        weights[i] = c[i] / max(g[3 * N_NODES + i], least)
+    for i in range(min(nodes, STRIDE)):
+        weights[i] = c[i] / max(g[3 * STRIDE + i], least)
 
 
 @inner_kernel
@@ -419,27 +455,27 @@ def flown_path(
     dt = tof / nodes
     n, ex, ey, h, k = x0[0], x0[1], x0[2], x0[3], x0[4]
     longitude = x0[5] + 0.5 * n * dt
-    for i in range(nodes):
+    for i in range(min(nodes, STRIDE)):
         w = 0.5 * weights[i]
-        r, t, o = w * g[i], w * g[N_NODES + i], w * g[2 * N_NODES + i]
+        r, t, o = w * g[i], w * g[STRIDE + i], w * g[2 * STRIDE + i]
         remaining = tof - (i + 0.5) * dt
-        dn = rows[i] * r + rows[N_NODES + i] * t
-        dex = rows[2 * N_NODES + i] * r + rows[3 * N_NODES + i] * t + rows[4 * N_NODES + i] * o
-        dey = rows[5 * N_NODES + i] * r + rows[6 * N_NODES + i] * t + rows[7 * N_NODES + i] * o
-        dh = rows[8 * N_NODES + i] * o
-        dk = rows[9 * N_NODES + i] * o
+        dn = rows[i] * r + rows[STRIDE + i] * t
+        dex = rows[2 * STRIDE + i] * r + rows[3 * STRIDE + i] * t + rows[4 * STRIDE + i] * o
+        dey = rows[5 * STRIDE + i] * r + rows[6 * STRIDE + i] * t + rows[7 * STRIDE + i] * o
+        dh = rows[8 * STRIDE + i] * o
+        dk = rows[9 * STRIDE + i] * o
         dl = (
-            rows[10 * N_NODES + i] * r
-            + rows[11 * N_NODES + i] * t
-            + rows[12 * N_NODES + i] * o
+            rows[10 * STRIDE + i] * r
+            + rows[11 * STRIDE + i] * t
+            + rows[12 * STRIDE + i] * o
             - remaining * dn
         )
         path[i] = n + dn
-        path[N_NODES + i] = ex + dex
-        path[2 * N_NODES + i] = ey + dey
-        path[3 * N_NODES + i] = h + dh
-        path[4 * N_NODES + i] = k + dk
-        path[5 * N_NODES + i] = longitude + dl
+        path[STRIDE + i] = ex + dex
+        path[2 * STRIDE + i] = ey + dey
+        path[3 * STRIDE + i] = h + dh
+        path[4 * STRIDE + i] = k + dk
+        path[5 * STRIDE + i] = longitude + dl
         n += 2.0 * dn
         ex += 2.0 * dex
         ey += 2.0 * dey
@@ -450,15 +486,14 @@ def flown_path(
 
 @inner_kernel
 def workspace() -> PathWork:
-    """Return scratch arrays: path, rows, p, weights, g, c, m, d, anomaly."""
+    """Return scratch arrays: path, rows, p, weights, g, c, d, anomaly."""
     return (
-        np.empty(6 * N_NODES),
-        np.empty(13 * N_NODES),
+        np.empty(6 * STRIDE),
+        np.empty(13 * STRIDE),
         np.empty(6),
-        np.empty(N_NODES),
-        np.empty(4 * N_NODES),
-        np.empty(N_NODES),
-        np.empty((6, 6)),
+        np.zeros(STRIDE),
+        np.zeros(4 * STRIDE),
+        np.zeros(STRIDE),
         np.empty(6),
-        np.empty(6 * N_NODES),
+        np.empty(6 * STRIDE),
     )

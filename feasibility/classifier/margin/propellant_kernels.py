@@ -20,6 +20,7 @@ from feasibility.classifier.margin.feature_kernels import least_motion, to_frame
 from feasibility.classifier.margin.path_kernels import (
     N_NODES,
     SATURATED,
+    STRIDE,
     duals,
     first_path,
     flown_path,
@@ -57,7 +58,6 @@ def least_impulses(
     weights: _Array,
     g: _Array,
     bound: _Array,
-    m: _Array,
 ) -> float:
     """Return the sum of impulses after some steps, SATURATED where the problem is singular.
 
@@ -67,18 +67,18 @@ def least_impulses(
     """
     total = SATURATED
     for step in range(steps):
-        if not weighted_solve(rows, weights, d, N_NODES, m, p):
+        if not weighted_solve(rows, weights, d, N_NODES, p):
             return SATURATED
         duals(rows, p, N_NODES, g)
         total = 0.0
         for i in range(N_NODES):
             if step == 0:
                 bound[i] = push * math.exp(min(total / exhaust_velocity, _MOST_BURNT))
-            total += weights[i] * g[3 * N_NODES + i]
+            total += weights[i] * g[3 * STRIDE + i]
         if step < steps - 1:
             least = _LEAST_WEIGHT * total / N_NODES
             for i in range(N_NODES):
-                dual = g[3 * N_NODES + i] + 1e-9
+                dual = g[3 * STRIDE + i] + 1e-9
                 weights[i] = max(min(weights[i] * dual * math.sqrt(dual), bound[i] / dual), least)
     return total
 
@@ -113,8 +113,8 @@ def propellant_batch(
         bound by the last dual; the share of segments at full thrust; the shares of five groups
         of segments in the sum. All 0 where there is no hint.
     """
-    path, rows, p, weights, g, bound, m, d, anomaly = workspace()
-    flown = np.empty(6 * N_NODES)
+    path, rows, p, weights, g, bound, d, anomaly = workspace()
+    flown = np.empty(6 * STRIDE)
     s0, s1, x0, x1 = np.empty(6), np.empty(6), np.empty(6), np.empty(6)
     for leg in range(len(tof_s)):
         said = out[leg]
@@ -136,18 +136,18 @@ def propellant_batch(
         for i in range(N_NODES):
             weights[i] = 1.0
         ve, most = exhaust[leg] / speed, push[leg] / speed
-        total = least_impulses(rows, d, ve, most, int(_FIRST_STEPS), p, weights, g, bound, m)
+        total = least_impulses(rows, d, ve, most, int(_FIRST_STEPS), p, weights, g, bound)
         if not total < SATURATED:
             continue
         for j in range(4):
             said[j] = total
         for _ in range(_ROUNDS):
             flown_path(x0, rows, weights, g, tof, N_NODES, flown)
-            for i in range(6 * N_NODES):
+            for i in range(6 * STRIDE):
                 path[i] += _DAMPING * (flown[i] - path[i])
             if not gauss_rows(path, tof, N_NODES, rows, anomaly):
                 break
-            total = least_impulses(rows, d, ve, most, int(_NEXT_STEPS), p, weights, g, bound, m)
+            total = least_impulses(rows, d, ve, most, int(_NEXT_STEPS), p, weights, g, bound)
             if not total < SATURATED:
                 break
             said[1], said[2], said[3] = said[2], said[3], total
@@ -165,8 +165,8 @@ def _write_shares(
     for j in range(6):
         value += p[j] * d[j]
     for i in range(N_NODES):
-        largest = max(largest, g[3 * N_NODES + i])
-        impulse = weights[i] * g[3 * N_NODES + i]
+        largest = max(largest, g[3 * STRIDE + i])
+        impulse = weights[i] * g[3 * STRIDE + i]
         total += impulse
         full += 1.0 if impulse > _FULL * bound[i] else 0.0
         said[N_SUMS + 1 + i * N_GROUPS // N_NODES] += impulse

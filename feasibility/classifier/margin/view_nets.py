@@ -24,6 +24,9 @@ UNKNOWN: Final = 0.5
 class ViewNets:
     """A large net, a quick one, their calibration and domain, and the net for the final mass.
 
+    Some models have a middle one too, which sees what the quick one sees, knows more and is asked
+    about what that one leaves open.
+
     Parameters
     ----------
     artefact : Artefact
@@ -53,9 +56,13 @@ class ViewNets:
         self._error_fit = np.asarray(mass.get("error_fit", AS_IT_SAYS), dtype=np.float64)
         if view.kinds:
             _check_feature_set(str(domain["feature_set"]), view)
-        # One row a kind, where there are kinds.
+        # The quick net and those after it, each with a row a kind, where there are kinds.
+        middle = artefact.section(view.section("middle"))
         settled = np.asarray(quick["settled"], dtype=np.float64).reshape(-1, 2)
-        self._settled_low, self._settled_high = settled.T
+        self._settling = [(self._quick, settled)]
+        if middle:
+            bounds = np.asarray(middle["settled"], dtype=np.float64).reshape(-1, 2)
+            self._settling.append((MarginNet(middle), bounds))
         self._known_kinds = np.asarray(domain.get("kinds", [True]), dtype=np.bool_)
         levels = calibration["levels"].reshape(len(settled), -1)
         quantiles = calibration["quantiles"].reshape(len(settled), -1)
@@ -67,7 +74,7 @@ class ViewNets:
     def settle(
         self, legs: Legs
     ) -> tuple[_Array, NDArray[np.bool_], NDArray[np.bool_], NDArray[np.bool_]]:
-        """Return what the quick net knows.
+        """Return what the quick net knows, and the middle one.
 
         Probability (1 or 0, nearly, where settled), whether in the domain, whether there are
         quick features at all, and whether the other net has to look.
@@ -75,22 +82,27 @@ class ViewNets:
         X, hint = self._view.quick_features(legs)
         kinds = self._kinds(legs)
         known = np.isfinite(hint)
-        if known.all():
-            correction, error = self._quick(X)
-            inside = self._inside(X, kinds)
-        else:
+        probability = np.full(len(legs), CERTAIN)
+        inside = np.zeros(len(legs), dtype=np.bool_)
+        if not known.all():
             rows = np.flatnonzero(known)
-            correction, error = np.zeros(len(legs)), np.full(len(legs), np.nan)
-            inside = np.zeros(len(legs), dtype=np.bool_)
-            correction[rows], error[rows] = self._quick(X[rows])
             inside[rows] = self._inside(X[rows], _some(kinds, rows))
-        ratio = (self._view.log_acceleration(legs, legs.m0) - hint - correction) / error
-        which = 0 if kinds is None else kinds
-        low, high = self._settled_low[which], self._settled_high[which]
-        feasible = ratio > -low
-        infeasible = ratio < -high
-        probability = np.where(feasible, 1.0 - CERTAIN, CERTAIN)
-        return probability, inside, known, ~(feasible | infeasible)
+        else:
+            rows = np.arange(len(legs))
+            inside = self._inside(X, kinds)
+        excess = self._view.log_acceleration(legs, legs.m0) - hint
+        for net, settled in self._settling:
+            if not len(rows):
+                break
+            correction, error = net(X if len(rows) == len(X) else X[rows])
+            ratio = (excess[rows] - correction) / error
+            low, high = settled[0 if kinds is None else kinds[rows]].T
+            feasible = ratio > -low
+            probability[rows[feasible]] = 1.0 - CERTAIN
+            rows = rows[~(feasible | (ratio < -high))]
+        open_ = ~known
+        open_[rows] = True
+        return probability, inside, known, open_
 
     def look(self, legs: Legs) -> tuple[_Array, NDArray[np.bool_]]:
         """Return (n,) probabilities by the large net, and whether in the domain."""

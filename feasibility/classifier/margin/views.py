@@ -66,6 +66,8 @@ class LegView:
         Name of the features.
     names, quick_names : tuple of str
         The features of the large and of the quick net.
+    has_middle : bool
+        Whether a net between the two is worth its training: where the features cost much.
     features, quick_features : callable
         Legs to features (n, k) and the hint (n,), NaN where there is none.
     features_and_more : callable
@@ -92,6 +94,7 @@ class LegView:
     feature_set: str
     names: tuple[str, ...]
     quick_names: tuple[str, ...]
+    has_middle: bool
     features: Callable[[Legs], tuple[_Array, _Array]]
     quick_features: Callable[[Legs], tuple[_Array, _Array]]
     features_and_more: Callable[[Legs], tuple[_Array, _Array, _Array]]
@@ -154,6 +157,7 @@ RENDEZVOUS: Final = LegView(
     feature_set=FEATURE_SET,
     names=FEATURES,
     quick_names=QUICK_FEATURES,
+    has_middle=False,
     features=margin_features,
     quick_features=quick_features,
     features_and_more=_features_alone,
@@ -173,6 +177,7 @@ FREE_ENDS: Final = LegView(
     feature_set=FREE_FEATURE_SET,
     names=FREE_FEATURES,
     quick_names=FREE_QUICK_FEATURES,
+    has_middle=True,
     features=known_features,
     quick_features=quick_free_features,
     features_and_more=known_features_and_excess,

@@ -1,7 +1,7 @@
 """The nets of a margin model for one sort of legs, with calibration and domain."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final, final
 
@@ -29,6 +29,8 @@ SHARES: Final = (0.85, 0.05, 0.1)
 _QUICK_LAYERS: Final = (2, 64)
 _QUICK_EPOCHS: Final = 24
 _QUICK_UNIT: Final = 0.05
+_MIDDLE_LAYERS: Final = (3, 128)
+_MIDDLE_EPOCHS: Final = 30
 _SETTLED_TAIL: Final = 1e-3
 _SETTLED_SAFETY: Final = 1.05
 _DOMAIN_SLACK: Final = 0.03
@@ -144,19 +146,16 @@ def fit_view(
     error = examples.error[rows]
     correction, expected = MarginNet(net)(examples.X[rows])
     residual = correction - error
-    rough = parts.rough(examples)
-    rough_correction, rough_expected = MarginNet(quick)(examples.X_quick[rough.calibration])
-    rough_residual = rough_correction - examples.quick_error[rough.calibration]
-    settled = _by_kind(
-        view, examples.kinds[rough.calibration], rough_residual / rough_expected, _settled
-    )
     domain = _domain(examples, parts, view, known)
     sections = {
         "model": net,
-        "quick": {**quick, "settled": _no_narrower(settled, known.get("quick"))},
+        "quick": _with_settled(quick, examples, parts, view, known.get("quick")),
         "domain": domain,
         "calibration": _calibration(examples.kinds[rows], view, residual, expected, recipe.seed),
     }
+    middle = _fit_middle(examples, parts, view, recipe, known.get("middle"))
+    if middle:
+        sections["middle"] = middle
     legs = {
         "training": len(parts.learned),
         "validation": len(parts.validation),
@@ -174,7 +173,7 @@ _Sections = Mapping[str, Mapping[str, NDArray[Any]]]
 
 
 def _sections_of(start: Artefact, view: LegView) -> _Sections:
-    names = ("model", "quick", "domain")
+    names = ("model", "quick", "middle", "domain")
     sections = {name: start.section(view.section(name)) for name in names}
     return {name: arrays for name, arrays in sections.items() if arrays}
 
@@ -204,6 +203,64 @@ def _fit_nets(
         heed_outliers=True, start=known.get("quick"),
     )  # fmt: skip
     return net, quick
+
+
+def _fit_middle(
+    examples: MarginExamples,
+    parts: _Parts,
+    view: LegView,
+    recipe: MarginRecipe,
+    known: Mapping[str, NDArray[Any]] | None,
+) -> dict[str, NDArray[Any]]:
+    """Return the arrays of the net between the quick one and the large one; none where not worth.
+
+    A model that is to keep its nets gets none that it has not.
+    """
+    if not view.has_middle or not (recipe.epochs or known):
+        return {}
+    rough = parts.rough(examples)
+    layers, width = _MIDDLE_LAYERS
+    net = fit_net(
+        examples.X_quick, examples.quick_error, examples.weight, rough.learned, rough.validation,
+        recipe,
+        layers=layers, width=width, epochs=_MIDDLE_EPOCHS if recipe.epochs else 0,
+        unit=_QUICK_UNIT, heed_outliers=True, start=known,
+    )  # fmt: skip
+    return _with_settled(net, examples, parts, view, known)
+
+
+def add_middle(
+    artefact: Artefact, examples: MarginExamples, view: LegView, recipe: MarginRecipe
+) -> Artefact:
+    """Return a model with a new middle net for one sort of legs; all else stays.
+
+    Raises
+    ------
+    InputError
+        As for `fit_view`.
+    MissingDependencyError
+        The extra ``train`` is not installed.
+    """
+    found = _fit_middle(examples, _Parts.of(examples, recipe), view, recipe, None)
+    prefix = f"{view.section('middle')}/"
+    kept = {name: array for name, array in artefact.arrays.items() if not name.startswith(prefix)}
+    arrays = {**kept, **{f"{prefix}{name}": array for name, array in found.items()}}
+    return replace(artefact, arrays=arrays)
+
+
+def _with_settled(
+    net: Mapping[str, NDArray[Any]],
+    examples: MarginExamples,
+    parts: _Parts,
+    view: LegView,
+    known: Mapping[str, NDArray[Any]] | None,
+) -> dict[str, NDArray[Any]]:
+    """Return a net for the quick features with the errors beyond which a leg is settled."""
+    rows = parts.rough(examples).calibration
+    correction, expected = MarginNet(net)(examples.X_quick[rows])
+    residual = correction - examples.quick_error[rows]
+    settled = _by_kind(view, examples.kinds[rows], residual / expected, _settled)
+    return {**net, "settled": _no_narrower(settled, known)}
 
 
 def _by_kind(

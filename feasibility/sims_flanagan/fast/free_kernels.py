@@ -19,7 +19,13 @@ from feasibility.sims_flanagan.fast.dual_kernels import z_of_impulses
 from feasibility.sims_flanagan.fast.element_kernels import to_elements, wrap
 from feasibility.sims_flanagan.fast.frame_kernels import scale_leg, write_throttles
 from feasibility.sims_flanagan.fast.lifted_kernels import draw_path
-from feasibility.sims_flanagan.fast.maximum_kernels import bend, lay_hop, pursue, turns_of
+from feasibility.sims_flanagan.fast.maximum_kernels import (
+    bend,
+    lay_hop,
+    pursue,
+    spent,
+    turns_of,
+)
 from feasibility.sims_flanagan.fast.newton_kernels import polish
 from feasibility.sims_flanagan.fast.workspace_kernels import (
     BEST,
@@ -72,6 +78,11 @@ _SAME = 1e-3
 _AGREEMENT = 5
 _WINDING = 0.5
 _HOPS = 8
+# Impulses together, in exhaust velocities, beyond which starts hardly agree: short legs take bent
+# paths too, and those that need much take more than the first few of them.
+_DEEP = 1.0
+_ROUGH = 0.7
+_FEW = 16
 _TURN = 2.0 * math.pi
 _SHORT = math.pi
 _MET = 1e-9
@@ -409,17 +420,23 @@ def _best_free_arc(
     agreed = 0
     travel = _travel(w)
     long = travel > _SHORT
+    lost = False
     needed = _AGREEMENT + int(_WINDING * max(travel - _TURN, 0.0))
     n_bent = bent.shape[0]
-    n_hops = _HOPS if long else 0
+    n_hops = int(_HOPS)
     spare = int(_SPARE)
     for attempt in range(N_STARTS + n_bent + n_hops + shapes.shape[0]):
         k = attempt - N_STARTS
         hop = k - n_bent
-        if hop < n_hops and agreed >= needed:
+        # Bent paths are for long legs, for those that burn most of their mass, and for those
+        # that nothing else has closed; most of them for the latter two alone.
+        if k == 0:
+            lost = not best < np.inf
+        burnt = spent(n, c, w) if best < np.inf else 0.0
+        thorough = long or lost or burnt > _DEEP
+        if hop < n_hops and (agreed >= needed or (k >= 0 and not thorough)):
             continue
-        # Bent paths are for long legs, and for those that nothing else has closed.
-        if 0 <= k < n_bent and not long and best < np.inf:
+        if _FEW <= k < n_bent and best < np.inf and burnt < _ROUGH:
             continue
         if k < 0:
             s = _leading(w)
@@ -428,18 +445,18 @@ def _best_free_arc(
                 continue
         elif 0 <= hop < n_hops:
             s = spare
-            start = N_STARTS + bent.shape[0] + 1
+            start = N_STARTS + int(_FEW) + 1
             if not (best < np.inf and lay_hop(s, x0, bent[1 + hop], n, best, w)):
                 continue
         else:
             s = spare
-            start = N_STARTS + min(k, bent.shape[0])
+            start = N_STARTS + (k if k < _FEW else int(_FEW) + (2 if k < n_bent else 0))
             shape = bent[k] if hop < 0 else shapes[hop - n_hops]
             like = _likely(k, best, w)
             if _lay(s, turns[like], x0, x1, ends[like, 0], ends[like, 1], shape, tof, n, w):
                 sweeps = int(_FIRST_SWEEPS + _GENTLE)
                 bend(s, sweeps, int(_GENTLE), c, n, n_forward, best, w)
-        z = pursue(s, x0, c, n, n_forward, best, long, w)
+        z = pursue(s, x0, c, n, n_forward, best, thorough, w)
         if k < 0 and z < np.inf:
             w.p[TURN_Z, s] = z
         if z < best:
@@ -489,7 +506,8 @@ def free_maximum_batch(
     winner : (legs,) int64
         Receives the start that won: for 0 to 4 the number of turns between the bodies' orbits,
         for 6 to 10 between those of the cut Lambert arc, then Lambert's arcs, along the bodies'
-        orbits, bent paths, random ones, disturbed ones; `BALLISTIC` without thrust.
+        orbits, 16 bent paths, random ones, disturbed ones, further bent paths; `BALLISTIC`
+        without thrust.
     excess : (legs, 2, 3) float64
         Receives the velocities relative to the bodies at departure and arrival.
     """

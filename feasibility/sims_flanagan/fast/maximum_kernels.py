@@ -54,6 +54,8 @@ _LIKELY = 1.3
 _RIVAL = 1.1
 _HOPS = 8
 _HOP = 7.5
+# Impulses together, in exhaust velocities, beyond which not even short legs' starts agree.
+_DEEP = 2.0
 
 _Array = NDArray[np.float64]
 
@@ -241,6 +243,19 @@ def pursue(
 
 
 @inner_kernel
+def spent(n: int, c: float, w: Workspace) -> float:
+    """Return the sum of the impulses of the arc in w.n3[BEST], without excesses, over `c`."""
+    total = 0.0
+    for i in range(n):
+        if not w.s[FREE, i] > 0.0:
+            size = 0.0
+            for j in range(3):
+                size += w.n3[BEST, i, j] ** 2
+            total += math.sqrt(size)
+    return total / c
+
+
+@inner_kernel
 def _best_arc(
     x0: _Array, tof: float, c: float, n: int, bent: _Array, shapes: _Array, w: Workspace
 ) -> tuple[float, int, bool]:
@@ -262,17 +277,21 @@ def _best_arc(
             bend(s, int(_FIRST_SWEEPS), no_sweeps, c, n, n // 2, best, w)
         w.p[TURN_Z, s] = w.p[Z, s]
     travel = longest_travel(w)
-    # On short legs all starts agree.
+    # On short legs all starts agree, unless none closes or they burn nearly everything.
     long = travel > _SHORT
+    lost = False
     # With every further turn there are more optima, and agreement says less.
     needed = _AGREEMENT + int(_WINDING * max(travel - _TURN, 0.0))
-    n_bent = bent.shape[0] if long else 0
-    n_hops = _HOPS if long else 0
+    n_bent = bent.shape[0]
+    n_hops = int(_HOPS)
     for attempt in range(_N_TURNS + n_bent + n_hops + shapes.shape[0]):
         k = attempt - _N_TURNS
         hop = k - n_bent
         start = min(attempt, _N_TURNS + n_bent)
-        if k >= 0 and hop < n_hops and agreed >= needed:
+        if k == 0:
+            lost = not best < np.inf
+        thorough = long or lost or (best < np.inf and spent(n, c, w) > _DEEP)
+        if k >= 0 and hop < n_hops and (agreed >= needed or not thorough):
             continue
         if k < 0:
             s = leading_turn(w)
@@ -291,7 +310,7 @@ def _best_arc(
             shape = bent[k] if hop < 0 else shapes[hop - n_hops]
             if lay_path(s, turns_of(likely_turn(k, best, w)), shape, tof, n, w):
                 bend(s, first_and_gentle, int(_GENTLE), c, n, n // 2, best, w)
-        z = pursue(s, x0, c, n, n // 2, best, long, w)
+        z = pursue(s, x0, c, n, n // 2, best, thorough, w)
         if k < 0 and z < np.inf:
             w.p[TURN_Z, s] = z
         if z < best:

@@ -31,6 +31,8 @@ from feasibility.sims_flanagan.solutions import (
 # remain moderate ellipses.
 _SPREAD: Final = 0.2 / np.array([1.0, 2.0, 3.0])
 _N_BENT: Final = 15
+# Legs with free ends that burn much have more optima.
+_N_BENT_FREE: Final = 47
 # Rounding of masses that went through a file or through units.
 _MASS_ROUNDING: Final = 1e-6
 
@@ -143,7 +145,7 @@ def _solve_free(
         legs.vinf_arr.copy(),
         n_segments,
         MU_SUN,
-        _bent_paths(),
+        _bent_paths(_N_BENT_FREE),
         shapes,
         throttles,
         z,
@@ -320,9 +322,9 @@ def _restart_light(
     start[rows] = TWO_IMPULSE + winner[won]
 
 
-def _bent_paths() -> NDArray[np.float64]:
-    """Return the path shapes that every long leg is tried with; the first is straight."""
-    bent = _SPREAD * np.random.default_rng(1).standard_normal((1 + _N_BENT, 5, 3))
+def _bent_paths(n: int = _N_BENT) -> NDArray[np.float64]:
+    """Return `n` path shapes that long legs are tried with, after a straight one."""
+    bent = _SPREAD * np.random.default_rng(1).standard_normal((1 + n, 5, 3))
     bent[0] = 0.0
     return bent
 

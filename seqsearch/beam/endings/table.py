@@ -14,6 +14,7 @@ from seqsearch.core.hop_margins import log_margin, quick_margin_of
 from seqsearch.core.nodes import Nodes
 from seqsearch.core.problem import Problem
 from seqsearch.core.way_home import LONGEST_DAYS, SHORTEST_DAYS, hops_home
+from seqsearch.tours.records import LARGEST_M_STAR_KG
 
 _Array = NDArray[np.float64]
 _Index = NDArray[np.intp]
@@ -28,6 +29,7 @@ _OFFSET: Final = 1 << 19
 _LATE_SHARE: Final = 0.2
 """Share of the propellant that is left where margins are asked for: m* hardly depends on it."""
 
+_LARGEST_LOG: Final = float(np.log(LARGEST_M_STAR_KG))
 _CELLS_AT_ONCE: Final = 1000
 
 
@@ -107,7 +109,13 @@ class WayHomeTable:
         parent = np.repeat(np.arange(n), k)
         tof = np.tile(TOFS_DAYS, n)
         hops = hops_home(self._problem, self._ending, nodes, parent, epoch[parent], tof)
-        log = log_margin(self._ask, hops) + np.log(self._mass)
+        # A leg that needs no thrust has no largest mass, and between inf there is no middle.
+        log = np.minimum(log_margin(self._ask, hops) + np.log(self._mass), _LARGEST_LOG)
         legs = hops.legs[-1]
-        delta_v = lambert_delta_v(legs.rv_dep, legs.rv_arr, legs.tof_s, max_revs=0)
+        delta_v = lambert_delta_v(
+            *(legs.rv_dep, legs.rv_arr, legs.tof_s),
+            max_revs=0,
+            vinf_dep=legs.vinf_dep,
+            vinf_arr=legs.vinf_arr,
+        )
         return log.reshape(n, k), delta_v.reshape(n, k)

@@ -8,6 +8,7 @@ from seqsearch.problems.ends.rules import EndsRules
 from seqsearch.problems.rendezvous import RendezvousProblem
 
 RULES = EndsRules
+MISSION_KEYS = ("end_id", "must_visit", "bodies")
 
 
 def build(base: RendezvousProblem, rules: EndsRules) -> Problem:

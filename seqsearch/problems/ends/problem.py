@@ -66,7 +66,8 @@ class EndsProblem(RendezvousVariant):
     Raises
     ------
     InputError
-        A stay at bodies that are passed, or a speed at the end of tours that have none.
+        A stay at bodies that are passed, an end of tours of fly-bys or bodies that these must
+        visit, or a speed at the end of tours that have none.
     """
 
     rules: EndsRules
@@ -77,6 +78,11 @@ class EndsProblem(RendezvousVariant):
                 f"problem {self.name}: min_stay_days = {self.min_stay_days:g} and visits = "
                 '"fly-by", expected 0: what is passed cannot be stayed at'
             )
+        if self.passes and self.ending is not None:
+            raise InputError(
+                f'problem {self.name}: an end_id or must_visit and visits = "fly-by", expected '
+                "them in tours of rendezvous alone"
+            )
         if self.rules.arrival_vinf_km_s > 0.0 and self._end_row is None:
             raise InputError(
                 f"problem {self.name}: arrival_vinf_km_s without a body at which tours end"
@@ -86,6 +92,14 @@ class EndsProblem(RendezvousVariant):
     def passes(self) -> bool:
         """Whether visits are fly-bys."""
         return self.rules.visits == "fly-by"
+
+    @property
+    def rows_to_avoid(self) -> NDArray[np.intp]:
+        """Rows that are not visited on the way; the planet of the launch is one."""
+        avoided = self.base.rows_to_avoid
+        if self.rules.launch_from is None:
+            return avoided
+        return np.union1d(avoided, self.start_rows())
 
     @property
     def launch_m_s(self) -> float:
@@ -163,8 +177,7 @@ class EndsProblem(RendezvousVariant):
     @property
     def _end_row(self) -> int | None:
         """Row of the body at which tours end; None for any."""
-        row: int | None = getattr(getattr(self.base, "ending", None), "row", None)
-        return row
+        return None if self.ending is None else self.ending.row
 
 
 def _stated(bound_m_s: float) -> float | UnsetType | None:

@@ -20,6 +20,7 @@ from feasibility.classifier.margin.free_features import (
     log_no_thrust,
     quick_free_features,
 )
+from feasibility.classifier.margin.lanes.free_kernels import free_quick_lane_batch
 from feasibility.constants import AU, DAY_S, MU_SUN
 from feasibility.orbits.kepler_kernels import propagate_batch
 from feasibility.sims_flanagan.fast.solver import fast_max_initial_mass
@@ -39,7 +40,7 @@ def features_of(rv_dep, rv_arr, tof, exhaust, ends, mu=MU_SUN, *, quick=False):
     width = kernels.N_FREE_QUICK if quick else kernels.N_FREE
     X, hint = np.empty((len(tof), width)), np.empty(len(tof))
     if quick:
-        kernels.free_quick_batch(rv_dep, rv_arr, tof, exhaust, ends, mu, X, hint)
+        free_quick_lane_batch(rv_dep, rv_arr, tof, exhaust, ends, mu, X, hint)
     else:
         excess = np.empty((len(tof), 6))
         kernels.free_feature_batch(rv_dep, rv_arr, tof, exhaust, ends, mu, X, hint, excess)

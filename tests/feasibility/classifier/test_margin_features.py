@@ -17,8 +17,9 @@ from feasibility.classifier.margin.features import (
     margin_features,
     quick_features,
 )
+from feasibility.classifier.margin.lanes.rendezvous_kernels import quick_lane_batch
 from feasibility.classifier.margin.path_kernels import (
-    N_NODES,
+    STRIDE,
     balanced_impulse,
     impulse_effects,
     sine_cosine,
@@ -47,7 +48,7 @@ def arrays(legs):
 def features_of(rv_dep, rv_arr, tof, exhaust, mu=MU_SUN, *, quick=False):
     width = kernels.N_QUICK if quick else kernels.N_FEATURES
     X, hint = np.empty((len(tof), width)), np.empty(len(tof))
-    batch = kernels.quick_batch if quick else kernels.feature_batch
+    batch = quick_lane_batch if quick else kernels.feature_batch
     batch(rv_dep, rv_arr, tof, exhaust, mu, X, hint)
     return X, hint
 
@@ -137,12 +138,12 @@ def test_gauss_rows_are_what_a_small_impulse_does(seed):
     state, plus, minus = np.empty(6), np.empty(6), np.empty(6)
     from_elements(x, state)
     # The leg's orbit at one of seven nodes, among other ones.
-    path, rows, anomaly = np.zeros((6, N_NODES)), np.zeros(13 * N_NODES), np.zeros(6 * N_NODES)
+    path, rows, anomaly = np.zeros((6, STRIDE)), np.zeros(13 * STRIDE), np.zeros(6 * STRIDE)
     path[:, :7] = np.array([1.0, 0.1, 0.1, 0.1, 0.1, 2.0])[:, None]
     node, remaining = rng.integers(7), rng.uniform(0.0, 5.0)
     path[:, node], anomaly[node] = x, remaining
     assert impulse_effects(path.reshape(-1), 7, rows, anomaly)
-    row = rows.reshape(13, N_NODES)[:, node]
+    row = rows.reshape(13, STRIDE)[:, node]
     r, v = state[:3], state[3:]
     radial = r / np.linalg.norm(r)
     normal = np.cross(r, v) / np.linalg.norm(np.cross(r, v))
@@ -162,12 +163,12 @@ def test_gauss_rows_are_what_a_small_impulse_does(seed):
 @given(seed=seeds, spent=st.floats(1e-4, 0.8))
 def test_the_lighter_spacecraft_gives_larger_impulses(seed, spent):
     nodes = 20
-    g = np.random.default_rng(seed).uniform(0.1, 2.0, (4, N_NODES))
+    g = np.random.default_rng(seed).uniform(0.1, 2.0, (4, STRIDE))
     exhaust = 1.3
     z = spent * exhaust / nodes
     shares = np.array([1 - z * spent_segments(i, nodes) / exhaust for i in range(nodes)])
     value = z * np.sum(g[3, :nodes] / shares)
-    c = np.empty(nodes)
+    c = np.empty(STRIDE)
     assert balanced_impulse(value, g.reshape(-1), exhaust, nodes, c) == pytest.approx(z, rel=1e-3)
 
 

@@ -112,6 +112,8 @@ def test_arrays_that_do_not_fit_together_are_refused(tmp_path, name):
         ("model/weight_1", np.zeros((256, 255), np.float32), "array weight_1"),
         ("quick/std", np.zeros(40), "array quick/std, expected more than zero"),
         ("quick/settled", np.zeros(3), "array settled"),
+        ("free_middle/settled", np.zeros(2), "array settled"),
+        ("free_middle/mean", np.zeros(3), "array mean"),
         ("domain/high", np.zeros(7), "array high"),
         ("calibration/positive_scores", np.array([]), "positive_scores is empty"),
         ("calibration/positive_scores", np.array([0.5, 0.2]), "rising probabilities"),

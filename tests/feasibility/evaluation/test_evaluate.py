@@ -11,7 +11,7 @@ from feasibility import FeasibilityClassifier, LambertPruner, Mima2Pruner, MimaP
 from feasibility.commands.cli import main
 from feasibility.constants import MU_SUN
 from feasibility.dataset import Dataset
-from feasibility.evaluation.evaluate import evaluate
+from feasibility.evaluation.evaluate import by_family, evaluate
 from feasibility.evaluation.peers import NEURAL, Peer, ask, known_peers, lambert_score
 from feasibility.legs import Legs
 from tests.helpers.labelled import labelled_dataset, write_dataset
@@ -156,3 +156,19 @@ def test_alone_asks_nobody_else_and_equal_names_are_refused(dataset, tmp_path, c
     assert "MIMA" not in capsys.readouterr().out
     assert main(["evaluate", "default", folder, folder]) == 2
     assert "different names" in capsys.readouterr().err
+
+
+def test_legs_that_can_all_be_flown_are_judged_without_what_needs_others(dataset, tmp_path):
+    part = dataset.take(np.flatnonzero(dataset.flyable))
+    peers, _ = known_peers()
+    found = evaluate(PACKAGE, part, peers)
+    assert found.metrics["share_feasible"] == 1.0
+    assert not {"auc", "balanced_accuracy"} & set(found.metrics)
+    assert found.pruning == ()
+    assert "recall asked" not in found.table()
+    assert all("auc" not in peer.metrics for peer in found.peers)
+    written = {path.name for path in found.write(tmp_path / "report", "flown")}
+    assert "roc.png" not in written
+    assert {"metrics.json", "reliability.png", "margin.png"} <= written
+    table = by_family({"all": evaluate(PACKAGE, dataset, peers), "flown": found})
+    assert "–" in table.splitlines()[3]

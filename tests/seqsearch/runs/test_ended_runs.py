@@ -8,6 +8,7 @@ import pytest
 from feasibility.constants import AU, MJD2000_MJD
 from seqsearch.commands.cli import main
 from seqsearch.core.ending import ending_of
+from seqsearch.problems.registry import builtin_problems
 from seqsearch.pruning.mima_predictor import MimaPredictor
 from seqsearch.runs.whole_chain import whole_chain
 from seqsearch.tours.tour_files import read_tour
@@ -134,3 +135,26 @@ def test_a_run_without_a_way_home_says_so_and_can_be_read(tmp_path):
     assert read_tour(out / "sequence.json").legs == ()
     assert main(["verify", str(out)]) == 1
     assert main(["report", str(out)]) == 0
+
+
+def test_a_run_that_arrives_with_speed_is_polished_and_verified(tmp_path, capsys):
+    problem = tmp_path / "fast.toml"
+    problem.write_text(_text() + "[ends]\nlaunch_vinf_km_s = 0.5\narrival_vinf_km_s = 1.0\n")
+    out = tmp_path / "run"
+    assert main(["run", str(problem), "--out", str(out), "--workers", "1"]) == 0
+    assert np.linalg.norm(read_tour(out / "sequence.json").legs[-1].arr_velocity_m_s) > 1.0
+    assert main(["polish", str(out), "--workers", "1", "--time-limit", "3s"]) == 0
+    assert main(["verify", str(out)]) == 0
+    assert "speed at the last arrival" in capsys.readouterr().out
+
+
+def test_a_run_of_fly_bys_is_not_polished(tmp_path, capsys):
+    problem = tmp_path / "passing.toml"
+    text = builtin_problems()["passing"].replace("starts = 40", "starts = 4")
+    problem.write_text(text.replace("beam_width = 20", "beam_width = 2"))
+    out = tmp_path / "run"
+    given = [str(problem), "--out", str(out), "--workers", "1", "--max-solves", "20"]
+    assert main(["run", *given]) == 0
+    capsys.readouterr()
+    assert main(["polish", str(out), "--workers", "1"]) != 0
+    assert "no tour of rendezvous alone" in capsys.readouterr().err
