@@ -33,9 +33,9 @@ HOME_TOF_DAYS: Final = np.array([50.0, 80.0, 120.0, 180.0, 270.0, 400.0])
 STEP_DAYS: Final = 80.0
 """Length of the intervals of departures."""
 
-_NEIGHBOURS: Final = 24
+_NEIGHBOURS: Final = 16
 _METRIC_DAYS: Final = 150.0
-_FARTHEST: Final = 4500.0
+_FARTHEST: Final = 3500.0
 """Neighbours that are asked about: how many, in which metric, and m/s of it."""
 
 _ASKED: Final = 3

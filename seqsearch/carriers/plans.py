@@ -34,8 +34,8 @@ SPREAD_DAYS: Final = 900.0
 
 STAY_DAYS: Final = 30.0
 
-OVERTIME_DAYS: Final = 110.0
-"""By how much predicted tours may be too long: retiming makes them 50 to 120 days shorter."""
+OVERTIME_DAYS: Final = 80.0
+"""By how much predicted tours may be too long: retiming makes them 10 to 100 days shorter."""
 
 RELEASES_DAYS: Final = 30.0
 """Step of the release epochs that are tried."""

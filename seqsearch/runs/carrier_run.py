@@ -5,7 +5,7 @@ from typing import Final
 
 from feasibility import InputError
 from feasibility.orbits import Catalogue
-from feasibility.runtime.atomic import write_json, write_text
+from feasibility.runtime.atomic import remove_stale, write_json, write_text
 from feasibility.runtime.cluster import crew as workers_of
 from feasibility.runtime.folders import new_folder
 from feasibility.runtime.interrupts import interrupt_code
@@ -112,6 +112,8 @@ def resume_carrier(
         The folder is damaged or in use, the asteroid table is another one, or the time is used up.
     """
     with folder_lock(path):
+        for folder in (path, *filter(Path.is_dir, path.iterdir())):
+            remove_stale(folder)
         config = read_config(str(path / CONFIG))
         if catalogue is not None:
             config = with_catalogue(config, catalogue)

@@ -9,6 +9,8 @@ from scipy.integrate import solve_ivp
 from feasibility.constants import AU, DAY_S, G0, MJD2000_MJD, MU_SUN
 from feasibility.continuous import ContinuousLeg, file_epoch, refine_leg
 from feasibility.orbits import cartesian_to_classical
+from seqsearch.carriers.campaign import CampaignSettings
+from seqsearch.carriers.homing import HomingSettings
 from seqsearch.tours.carrier.carrier_files import CARRIER, write_carrier
 from seqsearch.tours.carrier.path import fly_carrier
 from seqsearch.tours.carrier.records import (
@@ -208,3 +210,41 @@ def _tour(rules, rows, bodies):
         rules=tour_rules, t_start_mjd2000=legs[0].t_dep_mjd2000, bodies=bodies,
         legs=tuple(legs), score=1.0,
     )  # fmt: skip
+
+
+BELT_PROBLEM = """
+[problem]
+name = "gtoc7-full"
+
+[spacecraft]
+wet_mass_kg = 2000.0
+dry_mass_kg = 800.0
+thrust_n = 0.3
+isp_s = 3000.0
+
+[mission]
+first_departure_mjd = [59215.0, 65058.0]
+max_duration_days = 2191.5
+min_stay_days = 30.0
+
+[catalogue]
+synthetic_bodies = 12000
+synthetic_seed = 7
+
+[search]
+tof_days_min = 40.0
+tof_days_max = 240.0
+"""
+"""A mother ship in a synthetic belt."""
+
+TINY_CAMPAIGN = CampaignSettings(
+    rated=4000,
+    sifted=200,
+    continued=1,
+    judged=2,
+    manned=2,
+    improvements=4,
+    crews=HomingSettings(width=100, results=2),
+    launch_share=0.01,
+)
+"""Little of each stage."""

@@ -6,60 +6,24 @@ import pytest
 
 from seqsearch import read_tour
 from seqsearch.budget import Limits
-from seqsearch.carriers.campaign import CampaignSettings
-from seqsearch.carriers.homing import HomingSettings
 from seqsearch.commands.cli import main
 from seqsearch.problems.problem_file import read_config
 from seqsearch.runs.carrier_run import STATE, begin_carrier
 from seqsearch.runs.fleet import probe_paths
 from seqsearch.tours.carrier.carrier_files import CARRIER, read_carrier
 from seqsearch.tours.carrier.path import fly_carrier
-
-PROBLEM = """
-[problem]
-name = "gtoc7-full"
-
-[spacecraft]
-wet_mass_kg = 2000.0
-dry_mass_kg = 800.0
-thrust_n = 0.3
-isp_s = 3000.0
-
-[mission]
-first_departure_mjd = [59215.0, 65058.0]
-max_duration_days = 2191.5
-min_stay_days = 30.0
-
-[catalogue]
-synthetic_bodies = 12000
-synthetic_seed = 7
-
-[search]
-tof_days_min = 40.0
-tof_days_max = 240.0
-"""
+from tests.helpers.carriers import BELT_PROBLEM, TINY_CAMPAIGN
 
 pytestmark = pytest.mark.slow
-
-TINY = CampaignSettings(
-    rated=4000,
-    sifted=200,
-    continued=1,
-    judged=2,
-    manned=2,
-    improvements=4,
-    crews=HomingSettings(width=100, results=2),
-    launch_share=0.01,
-)
 
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
     folder = tmp_path_factory.mktemp("carrier")
     file = folder / "problem.toml"
-    file.write_text(PROBLEM)
+    file.write_text(BELT_PROBLEM)
     out = folder / "run"
-    assert begin_carrier(read_config(str(file)), out, 3, Limits(workers=1), TINY) == 0
+    assert begin_carrier(read_config(str(file)), out, 3, Limits(workers=1), TINY_CAMPAIGN) == 0
     return out
 
 
