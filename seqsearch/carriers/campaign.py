@@ -19,14 +19,15 @@ from feasibility.runtime.cluster import shared
 from seqsearch.carriers.chart_files import has_chart, write_chart
 from seqsearch.carriers.crew import (
     Crew,
+    find_again,
     find_crew,
-    find_probe,
     polished_probe,
     rebuilt_probe,
     repaired_probe,
 )
 from seqsearch.carriers.flight import carrier_of
 from seqsearch.carriers.homing import HomingSettings
+from seqsearch.carriers.joint import joined_crew
 from seqsearch.carriers.leg_chart import ChartPart
 from seqsearch.carriers.plans import RELEASES_DAYS, Plan, Screen
 from seqsearch.deadline import Deadline
@@ -50,6 +51,9 @@ _ANEW: Final = 0.2
 _REBUILT: Final = 0.2
 _REPAIRED: Final = 0.3
 """Shares of attempts to improve; the rest are polished."""
+
+_JOINED: Final = (0.1, 0.05)
+"""Share of attempts before them that polish all at once: for a crew that has not been, and has."""
 
 _WIDTHS: Final = (300.0, 5000.0)
 """Widths of beams that improve a tour."""
@@ -368,6 +372,8 @@ def _improved(context: _Context, crew: Crew, number: int, seed: int) -> Crew | N
     """Look for a better tour of one probe: anew, from some visit on, or by exchanges."""
     screen, problem = context.screen, context.problem
     rng = np.random.default_rng(seed)
+    if rng.random() < _JOINED[crew.course is not None]:
+        return joined_crew(screen, problem, crew, rng)
     settings = HomingSettings(
         width=int(np.exp(rng.uniform(*np.log(_WIDTHS)))),
         propellant_weight=float(rng.uniform(0.1, 0.6)),
@@ -380,7 +386,7 @@ def _improved(context: _Context, crew: Crew, number: int, seed: int) -> Crew | N
         other = int((number + rng.integers(1, len(crew.flights))) % len(crew.flights))
         closed = crew.closed(number, other)
         for probe in (other, number):
-            found = find_probe(screen, problem, crew.plan, closed, settings, offset, weights)
+            found = find_again(screen, problem, crew, probe, closed, settings, offset, weights)
             if found is None:
                 return None
             crew = crew.with_flight(probe, found)
@@ -388,7 +394,7 @@ def _improved(context: _Context, crew: Crew, number: int, seed: int) -> Crew | N
         return crew
     if kind < _TWO_ANEW + _ANEW:
         closed = crew.closed(number)
-        flight = find_probe(screen, problem, crew.plan, closed, settings, offset, weights)
+        flight = find_again(screen, problem, crew, number, closed, settings, offset, weights)
     elif kind < _TWO_ANEW + _ANEW + _REBUILT:
         kept = int(rng.integers(1, len(crew.flights[number].itinerary) - 2))
         flight = rebuilt_probe(screen, problem, crew, number, kept, settings)

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.classifier.predictor import LegPredictor
+from seqsearch.carriers.course import Course
 from seqsearch.carriers.homing import Homecoming, HomingSettings
 from seqsearch.carriers.plans import SPREAD_DAYS, STAY_DAYS, Plan, Screen
 from seqsearch.core.nodes import Nodes
@@ -33,6 +34,11 @@ STAY_MARGIN_DAYS: Final = 0.002
 
 WAIT_DAYS: Final = STAY_DAYS + TOUCH_DAYS + STAY_MARGIN_DAYS
 """What it costs a probe to stay at such an asteroid."""
+
+MISSION_DAYS: Final = 2191.5
+"""Longest time from a release to the capture."""
+
+_ROUNDING_DAYS: Final = 1e-6
 
 WEIGHTS: Final = (0.15, 0.25, 0.4)
 """Weights of propellant in the beams for one probe: which of them balances time and propellant
@@ -66,10 +72,15 @@ class Crew:
         The orbits.
     flights : tuple of Flight
         One a probe. The first and the last row of each are the orbits.
+    course : Course, optional
+        What the mother ship does in between; default: she releases all probes on the first orbit
+        and catches them on the second one. On a course each probe has orbits of its own, which
+        take the place of the asteroids' in `own_problem`.
     """
 
     plan: Plan
     flights: tuple[Flight, ...]
+    course: Course | None = None
 
     def visits(self) -> int:
         """Return the asteroids that count, those of the orbits included."""
@@ -79,7 +90,7 @@ class Crew:
 
     def slack_days(self) -> float:
         """Return the days that all probes together have left."""
-        return sum(_SIX_YEARS - flight.itinerary.duration_days for flight in self.flights)
+        return sum(MISSION_DAYS - flight.itinerary.duration_days for flight in self.flights)
 
     def mass_kg(self) -> float:
         """Return what is left of all probes."""
@@ -90,7 +101,7 @@ class Crew:
 
         Days of one probe are worth more than as many of two: a visit needs them together.
         """
-        days = [_SIX_YEARS - flight.itinerary.duration_days for flight in self.flights]
+        days = [MISSION_DAYS - flight.itinerary.duration_days for flight in self.flights]
         return self.visits() + 0.3 * sum(min(left / _VISIT_DAYS, 1.0) ** 2 for left in days)
 
     def closed(self, *but: int) -> tuple[int, ...]:
@@ -105,23 +116,37 @@ class Crew:
     def waits(self) -> tuple[int | None, int | None]:
         """Return the probes that stay at the asteroids of the first and the second orbit.
 
-        None where no probe has the time, or where the orbits are the same one.
+        None where no probe has the time, or where the orbits are the same one. On a course only
+        those that it provides for.
         """
-        slack = [_SIX_YEARS - flight.itinerary.duration_days for flight in self.flights]
+        slack = [MISSION_DAYS - flight.itinerary.duration_days for flight in self.flights]
         numbers: list[int | None] = [*range(len(slack)), None]
+        course = self.course
+        ways = [numbers, numbers] if course is None else [[k, None] for k in course.stays]
         best: tuple[int | None, int | None] = (None, None)
         value = (0, -np.inf)
-        for first, second in product(numbers, numbers):
+        for first, second in product(*ways):
             if self.plan.first == self.plan.second and second is not None:
                 continue
             left = list(slack)
-            for probe in (first, second):
+            for probe, days in ((first, self._wait_days(0)), (second, self._wait_days(1))):
                 if probe is not None:
-                    left[probe] -= WAIT_DAYS
+                    left[probe] -= days
             count = (first is not None) + (second is not None)
             if min(left, default=0.0) >= 0.0 and (count, min(left, default=0.0)) > value:
                 best, value = (first, second), (count, min(left, default=0.0))
         return best
+
+    def _wait_days(self, side: int) -> float:
+        """Return what it costs to stay at the first or second asteroid; inf where that is late."""
+        course = self.course
+        probe = None if course is None else course.stays[side]
+        if course is None or probe is None:
+            return WAIT_DAYS
+        itinerary = self.flights[probe].itinerary
+        begin, end = float(itinerary.t_dep_mjd2000[0]), float(itinerary.t_arr_mjd2000[-1])
+        days = begin - course.stay_epochs[0] if side == 0 else course.stay_epochs[1] - end
+        return days if days >= WAIT_DAYS - _ROUNDING_DAYS else np.inf
 
     def with_flight(self, number: int, flight: Flight) -> "Crew":
         """Return the crew with another tour of one probe."""
@@ -130,15 +155,26 @@ class Crew:
         return replace(self, flights=tuple(flights))
 
 
-_SIX_YEARS: Final = 2191.5
-
-
 def probe_problem(
     problem: RendezvousProblem, plan: Plan, duration_days: float
 ) -> RendezvousProblem:
     """Return the problem of one probe of a plan, of which retiming keeps the limits."""
     window = (plan.window_mjd2000, plan.window_mjd2000 + SPREAD_DAYS)
     return replace(problem, first_departure_mjd2000=window, max_duration_days=duration_days)
+
+
+def own_problem(problem: RendezvousProblem, crew: Crew, number: int) -> RendezvousProblem:
+    """Return the problem of one probe of a crew; on a course it has orbits of its own."""
+    plan, course = crew.plan, crew.course
+    own = probe_problem(problem, plan, problem.max_duration_days)
+    if course is None:
+        return own
+    begin, end = course.window(course.starts[number])
+    return replace(
+        own,
+        catalogue=course.catalogue_for(problem.catalogue, plan.first, plan.second, number),
+        first_departure_mjd2000=(max(begin + TOUCH_DAYS, plan.window_mjd2000), end - TOUCH_DAYS),
+    )
 
 
 def find_probe(
@@ -158,6 +194,33 @@ def find_probe(
         for tour in screen.tours(
             plan, replace(settings, propellant_weight=weight), tuple(avoid), offset_days
         )
+    ]
+    return _best_fitted(own, tours, None)
+
+
+def find_again(
+    screen: Screen,
+    problem: RendezvousProblem,
+    crew: Crew,
+    number: int,
+    avoid: Sequence[int],
+    settings: HomingSettings,
+    offset_days: float,
+    weights: tuple[float, ...],
+) -> Flight | None:
+    """Return the best tour of a probe of a crew, as `find_probe`; on a course from its coast."""
+    if crew.course is None:
+        return find_probe(screen, problem, crew.plan, avoid, settings, offset_days, weights)
+    own = own_problem(problem, crew, number)
+    begin, end = own.first_departure_mjd2000
+    plan = replace(crew.plan, window_mjd2000=begin)
+    tours = [
+        tour
+        for weight in weights
+        for tour in screen.tours(
+            plan, replace(settings, propellant_weight=weight), tuple(avoid), offset_days
+        )
+        if tour.itinerary.t_dep_mjd2000[0] < end
     ]
     return _best_fitted(own, tours, None)
 
@@ -211,7 +274,7 @@ def rebuilt_probe(
     )
     plan = crew.plan
     avoid = np.unique([plan.first, plan.second, *crew.closed(number)])
-    own = probe_problem(problem, plan, problem.max_duration_days)
+    own = own_problem(problem, crew, number)
     tails = screen.homing.run(node, plan.second, avoid, settings)
     tours = [replace(tail, itinerary=joined(head, tail.itinerary)) for tail in tails]
     best = _best_fitted(own, tours, before)
@@ -232,7 +295,7 @@ def repaired_probe(
     before, plan = crew.flights[number], crew.plan
     visits = before.itinerary.rows[1:-1].tolist()
     avoid = np.unique([plan.first, plan.second, *crew.closed(number)])
-    own = probe_problem(problem, plan, problem.max_duration_days)
+    own = own_problem(problem, crew, number)
     first = before.itinerary.t_dep_mjd2000[0] + rng.uniform(*_SHIFTS) + _SHIFTED
     window = own.first_departure_mjd2000
     epochs = np.unique(np.clip(first, window[0], window[1]))
@@ -278,7 +341,7 @@ def polished_probe(
     ids, plan = problem.catalogue.ids, crew.plan
     ends = int(ids[plan.first]), int(ids[plan.second])
     own = replace(
-        probe_problem(problem, plan, problem.max_duration_days),
+        own_problem(problem, crew, number),
         start_ids=ends[:1],
         end_id=ends[1],
         unscored_ids=tuple(sorted(set(ends))),
@@ -292,7 +355,7 @@ def polished_probe(
         rng=np.random.default_rng(seed),
         settings=_POLISH,
     )
-    flight = fly(problem, Itinerary.from_tour(own, result.tour))
+    flight = fly(own, Itinerary.from_tour(own, result.tour))
     return flight if flight is not None and _better(flight, before) else None
 
 

@@ -56,6 +56,14 @@ class Change:
         """Sum of both impulses in m/s."""
         return float(np.linalg.norm(self.dep_m_s) + np.linalg.norm(self.arr_m_s))
 
+    @property
+    def impulses(self) -> tuple[CarrierImpulse, CarrierImpulse]:
+        """Both, as events."""
+        return (
+            CarrierImpulse(t_mjd2000=self.t_dep_mjd2000, dv_m_s=self.dep_m_s),
+            CarrierImpulse(t_mjd2000=self.t_arr_mjd2000, dv_m_s=self.arr_m_s),
+        )
+
 
 def change_costs(
     catalogue: Catalogue, first: int, second: _Index, between_mjd2000: tuple[float, float]
@@ -158,7 +166,7 @@ def _arc(catalogue: Catalogue, first: int, second: int, t_dep: float, t_arr: flo
 def mother_flight(
     rules: CarrierRules,
     route: Route,
-    change: Change | None,
+    impulses: Sequence[CarrierImpulse],
     releases_mjd2000: Sequence[float],
     captures: Sequence[tuple[float, float]],
 ) -> Carrier:
@@ -170,8 +178,8 @@ def mother_flight(
         The problem.
     route : Route
         To the first orbit.
-    change : Change, optional
-        To the second orbit; default: she stays.
+    impulses : sequence of CarrierImpulse
+        After that, to the second orbit; none: she stays.
     releases_mjd2000 : sequence of float
         Epochs, one a probe.
     captures : sequence of tuple of float
@@ -182,15 +190,11 @@ def mother_flight(
         CarrierImpulse(t_mjd2000=route.first_mjd2000, dv_m_s=route.first_m_s),
         CarrierImpulse(t_mjd2000=route.second_mjd2000, dv_m_s=route.second_m_s),
     ]
-    more: list[CarrierEvent] = [
+    more: list[CarrierEvent] = [*impulses]
+    more += [
         CraftRelease(t_mjd2000=epoch, craft=number)
         for number, epoch in enumerate(releases_mjd2000, 1)
     ]
-    if change is not None:
-        more += [
-            CarrierImpulse(t_mjd2000=change.t_dep_mjd2000, dv_m_s=change.dep_m_s),
-            CarrierImpulse(t_mjd2000=change.t_arr_mjd2000, dv_m_s=change.arr_m_s),
-        ]
     more += [
         CraftCapture(t_mjd2000=epoch, craft=number, mass_kg=mass)
         for number, (epoch, mass) in enumerate(captures, 1)

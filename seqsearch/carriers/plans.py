@@ -269,32 +269,38 @@ class Screen:
         """Return the cheapest way to the first orbit that is in time; None for none."""
         key = plan.first, plan.window_mjd2000
         if key not in self._routes:
-            self._routes[key] = self._cheapest(plan)
+            self._routes[key] = self.cheapest_route(
+                plan.first,
+                plan.window_mjd2000 - self._latest_days(),
+                plan.window_mjd2000 - _WAIT_DAYS,
+            )
         return self._routes[key]
 
-    def _cheapest(self, plan: Plan) -> Route | None:
-        routes = self.routes(np.array([plan.first]))
+    def cheapest_route(
+        self, row: int, earliest_mjd2000: float, arrival_mjd2000: float
+    ) -> Route | None:
+        """Return the cheapest way to a body, by the earliest launch and the latest arrival."""
+        routes = self.routes(np.array([row]))
         launch = routes.launch_mjd2000
-        early = launch + routes.tof_days + _WAIT_DAYS <= plan.window_mjd2000
-        late = launch + self._latest_days() >= plan.window_mjd2000
-        routes = routes.take(np.flatnonzero(early & late))
+        early = launch + routes.tof_days <= arrival_mjd2000
+        routes = routes.take(np.flatnonzero(early & (launch >= earliest_mjd2000)))
         best: Route | None = None
-        body = self.catalogue.select(np.array([plan.first]))
+        body = self.catalogue.select(np.array([row]))
         for k in _apart(routes):
             launched = float(routes.launch_mjd2000[k])
-            latest = min(_LONGEST_DAYS, plan.window_mjd2000 - _WAIT_DAYS - launched)
+            latest = min(_LONGEST_DAYS, arrival_mjd2000 - launched)
             found = refined_route(
                 body,
                 launched,
                 float(routes.tof_days[k]),
                 v_inf=self.rules.v_inf_max_m_s,
                 window_mjd2000=(
-                    max(self.launch_mjd2000[0], plan.window_mjd2000 - self._latest_days()),
+                    max(self.launch_mjd2000[0], earliest_mjd2000),
                     self.launch_mjd2000[1],
                 ),
                 latest_arrival_days=latest,
             )
-            in_time = found.second_mjd2000 + _WAIT_DAYS <= plan.window_mjd2000
+            in_time = found.second_mjd2000 <= arrival_mjd2000
             if in_time and (best is None or found.delta_v < best.delta_v):
                 best = found
         return best

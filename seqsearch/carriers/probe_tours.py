@@ -9,6 +9,7 @@ from feasibility import InputError
 from feasibility.constants import AU, MJD2000_MJD
 from feasibility.orbits import Catalogue
 from seqsearch.carriers.crew import TOUCH_DAYS, WAIT_DAYS, Crew
+from seqsearch.carriers.flight import captures_of, releases_of
 from seqsearch.carriers.plans import SPREAD_DAYS
 from seqsearch.polish.flight import fly
 from seqsearch.polish.itinerary import Itinerary
@@ -48,16 +49,26 @@ def probe_config(config: Config, catalogue: Catalogue, crew: Crew, number: int) 
         for row, probe in zip((plan.first, plan.second), waits, strict=True)
         if probe not in (None, number)
     ]
-    window = plan.window_mjd2000 + MJD2000_MJD
+    released = releases_of(crew)[number]
+    window = (
+        min(plan.window_mjd2000 - WAIT_DAYS, released) - 1.0,
+        max(plan.window_mjd2000 + SPREAD_DAYS, released) + 1.0,
+    )
+    course = crew.course
+    orbits = (
+        catalogue
+        if course is None
+        else course.catalogue_for(catalogue, plan.first, plan.second, number)
+    )
     return msgspec.structs.replace(
         config,
         bodies=(
-            _orbit(catalogue, plan.first, RELEASE_ID, "mother ship at the release"),
-            _orbit(catalogue, plan.second, CAPTURE_ID, "mother ship at the capture"),
+            _orbit(orbits, plan.first, RELEASE_ID, "mother ship at the release"),
+            _orbit(orbits, plan.second, CAPTURE_ID, "mother ship at the capture"),
         ),
         mission=msgspec.structs.replace(
             config.mission,
-            first_departure_mjd=(window - WAIT_DAYS - 1.0, window + SPREAD_DAYS + 1.0),
+            first_departure_mjd=(window[0] + MJD2000_MJD, window[1] + MJD2000_MJD),
             start_ids=(RELEASE_ID,),
             end_id=CAPTURE_ID,
         ),
@@ -89,11 +100,12 @@ def probe_tour(config: Config, catalogue: Catalogue, crew: Crew, number: int) ->
     t_dep, tof = list(itinerary.t_dep_mjd2000), list(itinerary.tof_days)
     first, second = crew.waits()
     if first == number:
-        ids, t_dep, tof = [RELEASE_ID, *ids], [t_dep[0] - WAIT_DAYS, *t_dep], [TOUCH_DAYS, *tof]
+        released = releases_of(crew)[number]
+        ids, t_dep, tof = [RELEASE_ID, *ids], [released, *t_dep], [TOUCH_DAYS, *tof]
     else:
         ids[0] = RELEASE_ID
     if second == number:
-        away = t_dep[-1] + tof[-1] + WAIT_DAYS - TOUCH_DAYS
+        away = captures_of(crew)[number] - TOUCH_DAYS
         ids, t_dep, tof = [*ids, CAPTURE_ID], [*t_dep, away], [*tof, TOUCH_DAYS]
     else:
         ids[-1] = CAPTURE_ID

@@ -1,5 +1,6 @@
 """The state of a campaign as a file, from which it goes on."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Final, final
 
@@ -9,11 +10,14 @@ import numpy as np
 from feasibility import InputError
 from feasibility.runtime.atomic import write_text
 from seqsearch.carriers.campaign import CampaignState
-from seqsearch.carriers.crew import Crew
+from seqsearch.carriers.course import Course
+from seqsearch.carriers.crew import Crew, own_problem
 from seqsearch.carriers.plans import Plan
+from seqsearch.carriers.routes import Route
 from seqsearch.polish.flight import fly
 from seqsearch.polish.itinerary import Itinerary
 from seqsearch.problems.rendezvous import RendezvousProblem
+from seqsearch.tours.carrier.records import CarrierImpulse
 
 _FORMAT: Final = "seqsearch-campaign-2"
 
@@ -33,9 +37,21 @@ class _ProbeRecord(_Record, frozen=True, kw_only=True):
 
 
 @final
+class _CourseRecord(_Record, frozen=True, kw_only=True):
+    impulses: tuple[CarrierImpulse, ...]
+    settled: int
+    starts: tuple[int, ...]
+    ends: tuple[int, ...]
+    stays: tuple[int | None, int | None]
+    stay_epochs: tuple[float, float]
+    route: Route | None
+
+
+@final
 class _CrewRecord(_Record, frozen=True, kw_only=True):
     plan: _PlanRow
     probes: tuple[_ProbeRecord, ...]
+    course: _CourseRecord | None = None
 
 
 @final
@@ -94,6 +110,17 @@ def write_state(path: Path, state: CampaignState, problem: RendezvousProblem) ->
                     )
                     for flight in crew.flights
                 ),
+                course=None
+                if crew.course is None
+                else _CourseRecord(
+                    impulses=crew.course.impulses,
+                    settled=crew.course.settled,
+                    starts=crew.course.starts,
+                    ends=crew.course.ends,
+                    stays=crew.course.stays,
+                    stay_epochs=crew.course.stay_epochs,
+                    route=crew.course.route,
+                ),
             )
             for crew in state.crews
         ),
@@ -124,16 +151,17 @@ def read_state(path: Path, problem: RendezvousProblem) -> CampaignState:
 
     def crew_of(crew: _CrewRecord) -> Crew:
         flights = []
-        for probe in crew.probes:
+        known = Crew(plan_of(crew.plan), (), _course_of(path, crew))
+        for number, probe in enumerate(crew.probes):
             rows = problem.catalogue.rows_of(np.array(probe.ids)).astype(np.intp)
             flight = fly(
-                problem,
+                own_problem(problem, known, number),
                 Itinerary(rows, np.array(probe.t_dep_mjd2000), np.array(probe.tof_days)),
             )
             if flight is None:
                 raise InputError(f"{path}: a leg of a tour has no solution")
             flights.append(flight)
-        return Crew(plan_of(crew.plan), tuple(flights))
+        return replace(known, flights=tuple(flights))
 
     return CampaignState(
         seed=record.seed,
@@ -149,4 +177,25 @@ def read_state(path: Path, problem: RendezvousProblem) -> CampaignState:
         continued=[plan_of(row) for row in record.continued],
         judged=[plan_of(row) for row in record.judged],
         crews=[crew_of(crew) for crew in record.crews],
+    )
+
+
+def _course_of(path: Path, crew: _CrewRecord) -> Course | None:
+    course = crew.course
+    if course is None:
+        return None
+    coasts = {*course.starts, *course.ends, course.settled}
+    stays = {number for number in course.stays if number is not None}
+    known = min(coasts) >= 0 and max(coasts) <= len(course.impulses)
+    known &= len(course.starts) == len(course.ends) == len(crew.probes)
+    if not (known and stays <= set(range(len(crew.probes)))):
+        raise InputError(f"{path}: a course that does not fit its probes and impulses")
+    return Course(
+        impulses=course.impulses,
+        settled=course.settled,
+        starts=course.starts,
+        ends=course.ends,
+        stays=course.stays,
+        stay_epochs=course.stay_epochs,
+        route=course.route,
     )

@@ -53,7 +53,7 @@ def test_a_mother_ship_meets_both_orbits_bodies(belt, route):
     change = change_orbit(belt, first, int(rows[0]), (begin, begin + 1400.0))
     assert change.delta_v <= costs[0] + 1e-6
     end = begin + 1500.0
-    carrier = mother_flight(RULES, way, change, [begin - 100.0], [(end, 900.0)])
+    carrier = mother_flight(RULES, way, change.impulses, [begin - 100.0], [(end, 900.0)])
     path = fly_carrier(carrier)
     for epoch, row in ((begin - 100.0, first), (end, int(rows[0]))):
         miss = path.states(epoch)[0] - belt.states_at([row], epoch)[0]

@@ -1,0 +1,186 @@
+"""From a crew to the schedule of its mother ship: which impulses may serve which probe."""
+
+from dataclasses import replace
+from itertools import product
+from typing import Final
+
+import numpy as np
+
+from seqsearch.carriers.crew import MISSION_DAYS, TOUCH_DAYS, WAIT_DAYS, Crew
+from seqsearch.carriers.flight import captures_of, carrier_of, releases_of, route_of
+from seqsearch.carriers.plans import Screen
+from seqsearch.carriers.schedule import Act, Schedule, Step
+from seqsearch.tours.carrier.records import CarrierImpulse
+
+_FIRST_LEAD_DAYS: Final = 12.0
+"""By how much an impulse comes before the release or capture that it is for, at first."""
+
+_RESERVE_DAYS: Final = 15.0
+"""By how much retiming may shift the release of a probe that stays at last for all its time."""
+
+
+def schedule_of(screen: Screen, crew: Crew) -> Schedule | None:
+    """Return what the mother ship of a crew may do; None where she cannot fly as it is.
+
+    Up to the release of the probe that stays at the first orbit's asteroid she is there, and at
+    the capture of the one that stays at the second's. Before each other release and capture there
+    is an impulse.
+    """
+    route = route_of(screen, crew)
+    carrier = carrier_of(screen, crew)
+    if route is None or carrier is None:
+        return None
+    rules = screen.rules
+    if crew.course is None:
+        # The plan's way leaves time for tours as long as they may be.
+        earliest = max(captures_of(crew)) + _RESERVE_DAYS - rules.max_duration_days
+        other = screen.cheapest_route(crew.plan.first, earliest, min(releases_of(crew)))
+        route = other if other is not None and other.delta_v < route.delta_v else route
+    impulses = list(carrier.impulses[2:])
+    count = len(crew.flights)
+    if crew.course is None:
+        stays = _stays(crew)
+        begins, ends = _with_stays(crew, stays)
+        releases = sorted(zip(begins, range(count), strict=True))
+        captures = sorted(zip(ends, range(count), strict=True))
+        steps = _steps(releases, captures, stays, impulses)
+    else:
+        stays = crew.course.stays
+        releases = sorted(zip(releases_of(crew), range(count), strict=True))
+        captures = sorted(zip(captures_of(crew), range(count), strict=True))
+        steps = _steps_again(crew, releases, captures, impulses)
+    steps[0] = replace(steps[0], range_mjd2000=(route.second_mjd2000 + TOUCH_DAYS, np.inf))
+    if stays[1] is not None:
+        steps = _with_late_capture(
+            steps, crew, stays[1], route.launch_mjd2000 + rules.max_duration_days
+        )
+    return Schedule(
+        steps,
+        screen.catalogue,
+        crew.plan.first,
+        crew.plan.second,
+        rules,
+        route,
+        stays,
+        [float(flight.mass[-1]) for flight in crew.flights],
+    )
+
+
+_Epochs = list[tuple[float, int]]
+_Stays = tuple[int | None, int | None]
+
+
+def _stays(crew: Crew) -> _Stays:
+    """Return which probes had best stay: those released first and caught first.
+
+    Then she is free to serve the others. As many stay as `Crew.waits` says.
+    """
+    wanted = crew.waits()
+    begins, ends = _with_stays(crew, (None, None))
+    best, earliest = wanted, (np.inf, np.inf)
+    for first, second in product(*[_others(crew, probe) for probe in wanted]):
+        stays = first, second
+        released, caught = _with_stays(crew, stays)
+        if max(b - a for a, b in zip(released, caught, strict=True)) > MISSION_DAYS:
+            continue
+        when = (
+            -np.inf if first is None else begins[first],
+            -np.inf if second is None else ends[second],
+        )
+        if when < earliest:
+            best, earliest = stays, when
+    return best
+
+
+def _others(crew: Crew, probe: int | None) -> list[int | None]:
+    return [None] if probe is None else [*range(len(crew.flights))]
+
+
+def _with_stays(crew: Crew, stays: _Stays) -> tuple[list[float], list[float]]:
+    """Return the epochs of all releases and captures if some probes stay."""
+    begins = [float(flight.itinerary.t_dep_mjd2000[0]) for flight in crew.flights]
+    ends = [float(flight.itinerary.t_arr_mjd2000[-1]) for flight in crew.flights]
+    if stays[0] is not None:
+        begins[stays[0]] -= WAIT_DAYS
+    if stays[1] is not None:
+        ends[stays[1]] += WAIT_DAYS
+    return begins, ends
+
+
+def _steps(
+    releases: _Epochs,
+    captures: _Epochs,
+    stays: _Stays,
+    change: list[CarrierImpulse],
+) -> list[Step]:
+    """Return the steps of a mother ship that changes her orbit once so far."""
+    leave, arrive = change
+    order = [number for _, number in captures]
+    before = 0 if stays[1] is None else order.index(stays[1])
+    steps: list[Step] = []
+    kept = -1 if stays[0] is None else [number for _, number in releases].index(stays[0])
+    for k, (epoch, number) in enumerate(releases):
+        if k > kept:
+            steps.append(Step(Act.IMPULSE, epoch - _FIRST_LEAD_DAYS))
+        steps.append(Step(Act.RELEASE, epoch, number, free=k > kept, stays=k == kept))
+    if before == 0:
+        steps.append(Step(Act.DEPART, leave.t_mjd2000))
+        steps.append(Step(Act.ARRIVE, arrive.t_mjd2000))
+    else:
+        steps.append(Step(Act.IMPULSE, leave.t_mjd2000, dv_m_s=leave.dv_m_s))
+    for k, (epoch, number) in enumerate(captures):
+        if k == before and k > 0:
+            earlier = captures[k - 1][0]
+            steps.append(Step(Act.DEPART, earlier + 0.1 * (epoch - earlier)))
+            steps.append(Step(Act.ARRIVE, earlier + 0.9 * (epoch - earlier)))
+        rests = number == stays[1]
+        if k == 0 and before > 0:
+            steps.append(Step(Act.IMPULSE, arrive.t_mjd2000, dv_m_s=arrive.dv_m_s))
+        elif not rests:
+            steps.append(Step(Act.IMPULSE, epoch - _FIRST_LEAD_DAYS))
+        steps.append(Step(Act.CAPTURE, epoch, number, stays=rests))
+    return steps
+
+
+def _steps_again(
+    crew: Crew, releases: _Epochs, captures: _Epochs, impulses: list[CarrierImpulse]
+) -> list[Step]:
+    """Return the steps of a mother ship that is on a course already."""
+    course = crew.course
+    assert course is not None
+    events = [
+        *[(epoch, Act.RELEASE, number) for epoch, number in releases],
+        *[(epoch, Act.CAPTURE, number) for epoch, number in captures],
+    ]
+    steps = []
+    for epoch, act, number in events:
+        away = act is Act.CAPTURE or course.starts[number] > 0
+        stays = number == course.stays[0 if act is Act.RELEASE else 1]
+        steps.append(Step(act, epoch, number, free=away, stays=stays))
+    for k, impulse in enumerate(impulses, 1):
+        if k == course.settled - 1:
+            steps.append(Step(Act.DEPART, impulse.t_mjd2000))
+        elif k == course.settled:
+            steps.append(Step(Act.ARRIVE, impulse.t_mjd2000))
+        else:
+            steps.append(Step(Act.IMPULSE, impulse.t_mjd2000, dv_m_s=impulse.dv_m_s))
+    return sorted(steps, key=lambda step: step.t_mjd2000)
+
+
+def _with_late_capture(
+    steps: list[Step], crew: Crew, number: int, end_mjd2000: float
+) -> list[Step]:
+    """Return the steps with the range of when the probe is caught that stays at last.
+
+    It may stay for all of the time that it has left.
+    """
+    released = next(step for step in steps if step.probe == number and step.act is Act.RELEASE)
+    reserve = _RESERVE_DAYS if released.free and not released.stays else TOUCH_DAYS
+    latest = released.t_mjd2000 + MISSION_DAYS - reserve
+    earliest = float(crew.flights[number].itinerary.t_arr_mjd2000[-1]) + WAIT_DAYS
+    return [
+        replace(step, range_mjd2000=(earliest, max(earliest, min(latest, end_mjd2000))))
+        if step.probe == number and step.act is Act.CAPTURE
+        else step
+        for step in steps
+    ]
