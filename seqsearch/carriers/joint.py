@@ -27,6 +27,10 @@ from seqsearch.problems.rendezvous import RendezvousProblem
 
 _Array = NDArray[np.float64]
 
+LATE_DAYS: Final = 1.0
+"""Time after the capture of a probe that stays at the second asteroid during which she stays as
+well: with continuous thrust tours may end some hours later."""
+
 LEAD_DAYS: Final = 4.0
 """Least time between an impulse and a release or capture: retiming shifts them a little."""
 
@@ -303,6 +307,8 @@ def _gap(before: Step, after: Step) -> float:
     probes = [step for step in (before, after) if step.probe >= 0]
     if len(probes) != 1:
         return 0.0
+    if before.act is Act.CAPTURE and before.stays:
+        return LATE_DAYS
     return LEAD_DAYS if probes[0].free and not probes[0].stays else TOUCH_DAYS
 
 
