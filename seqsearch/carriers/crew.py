@@ -170,13 +170,13 @@ def own_problem(problem: RendezvousProblem, crew: Crew, number: int) -> Rendezvo
     if course is None:
         return own
     begin, end = course.window(course.starts[number])
+    window = max(begin + TOUCH_DAYS, plan.window_mjd2000), end - TOUCH_DAYS
     # She may be there before the plan's window.
-    departure = float(crew.flights[number].itinerary.t_dep_mjd2000[0])
-    earliest = min(max(begin + TOUCH_DAYS, plan.window_mjd2000), departure)
+    departures = [float(f.itinerary.t_dep_mjd2000[0]) for f in crew.flights[number : number + 1]]
     return replace(
         own,
         catalogue=course.catalogue_for(problem.catalogue, plan.first, plan.second, number),
-        first_departure_mjd2000=(earliest, max(end - TOUCH_DAYS, departure)),
+        first_departure_mjd2000=(min(*window, *departures), max(*window, *departures)),
     )
 
 
