@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from feasibility import Legs
 from feasibility.classifier.margin import feature_kernels as kernels
+from feasibility.classifier.margin import path_kernels
 from feasibility.classifier.margin.features import (
     DOMAIN_QUANTITIES,
     FEATURES,
@@ -22,12 +23,12 @@ from feasibility.classifier.margin.path_kernels import (
     STRIDE,
     balanced_impulse,
     impulse_effects,
-    sine_cosine,
     spent_segments,
 )
 from feasibility.constants import AU, DAY_S, MU_SUN
 from feasibility.dataset import read_protocol
 from feasibility.orbits import synthetic_main_belt
+from feasibility.runtime.jit import kernel
 from feasibility.sims_flanagan.fast.element_kernels import from_elements, to_elements
 from feasibility.sims_flanagan.fast.solver import fast_max_initial_mass
 
@@ -118,6 +119,12 @@ def test_the_unit_of_acceleration_is_that_of_the_departure_orbit():
                3000.0, 0.0)  # fmt: skip
     expected = np.log(2.0 / 1000.0 / (MU_SUN / AU**2))
     np.testing.assert_allclose(log_acceleration(leg, leg.m0), expected, rtol=1e-12)
+
+
+@kernel
+def sine_cosine(x):
+    """Python cannot call what becomes a part of loops."""
+    return path_kernels.sine_cosine(x)
 
 
 @given(x=st.floats(-1e4, 1e4))
