@@ -91,7 +91,7 @@ class CampaignSettings:
     sifted: int = 4000
     continued: int = 150
     judged: int = 600
-    manned: int = 40
+    manned: int = 150
     improvements: int = 400
     kept: int = 6
     crews: HomingSettings = _CREWS
