@@ -17,6 +17,18 @@ _Codes = NDArray[np.uint16]
 _Array = NDArray[np.float64]
 _Index = NDArray[np.int32]
 
+Chart = tuple[NDArray[np.int64], _Index, _Codes, _Codes, _Array]
+"""Offsets, targets, m*, velocity changes, logarithms of flight times, as `LegChart` has them."""
+
+Grid = tuple[float, float, int]
+"""Where the first interval begins, how long each is, how many there are."""
+
+Home = tuple[int, _Index, _Codes, _Codes, _Array]
+"""First interval, index, m*, velocity changes and logarithms of flight times of `Ways`."""
+
+Craft = tuple[float, float, float, float, float]
+"""Dry and first mass (kg), thrust (N), exhaust velocity (m/s), reserve in log(m*)."""
+
 BURN_A = 4.18
 BURN_B = 0.82
 """Of `feasibility.classifier.predictor.bounded_final_mass`."""
@@ -89,47 +101,36 @@ def mass_after(
 
 @inner_kernel
 def home_days(
-    ready: float,
-    mass: float,
-    row: int,
-    left: float,
-    t0: float,
-    step: float,
-    home_first: int,
-    home_index: _Index,
-    home_m: _Codes,
-    home_v: _Codes,
-    home_log_tof: _Array,
-    reserve: float,
-    m_dry: float,
-    thrust: float,
-    exhaust: float,
+    ready: float, mass: float, row: int, left: float, grid: Grid, home: Home, craft: Craft
 ) -> float:
     """Return the shortest flight to the end; NEVER where there is none."""
+    t0, step, _ = grid
+    first, index, m_star, delta_v, log_tof = home
+    m_dry, _, thrust, exhaust, reserve = craft
     place = (ready - t0) / step
-    k = math.floor(place) - home_first
-    if k < 0 or k >= home_index.shape[0]:
+    k = math.floor(place) - first
+    if k < 0 or k >= index.shape[0]:
         return NEVER
-    h = home_index[k, row]
+    h = index[k, row]
     if h < 0:
         return NEVER
     share = place - math.floor(place)
-    log_tof = shortest_flight(home_m[h], share, home_log_tof, math.log(mass) + reserve)
-    if log_tof >= NEVER:
+    least = shortest_flight(m_star[h], share, log_tof, math.log(mass) + reserve)
+    if least >= NEVER:
         return NEVER
-    last = min(math.log(max(left, 1.0)), home_log_tof[-1])
+    last = min(math.log(max(left, 1.0)), log_tof[-1])
     # Longer flights burn less.
     for trial in range(HOME_TRIALS):
-        at = log_tof + HOME_STRETCH * trial
+        at = least + HOME_STRETCH * trial
         if at > last:
             at = last
-        if at < log_tof:
+        if at < least:
             return NEVER
         days = math.exp(at)
         after = mass_after(
             mass,
-            value_at(home_m[h], share, home_log_tof, at),
-            value_at(home_v[h], share, home_log_tof, at),
+            value_at(m_star[h], share, log_tof, at),
+            value_at(delta_v[h], share, log_tof, at),
             days * 86400.0,
             thrust,
             exhaust,
@@ -141,53 +142,47 @@ def home_days(
     return NEVER
 
 
+@inner_kernel
+def _is_among(bodies: _Index, body: int) -> bool:
+    for other in bodies:  # noqa: SIM110 (numba has no generators here)
+        if other == body:
+            return True
+    return False
+
+
 @kernel
 def expand(
-    row: _Index,
-    ready: _Array,
-    first: _Array,
-    mass: _Array,
-    closed: NDArray[np.bool_],
+    nodes: tuple[_Index, _Array, _Array, _Array],
     own: _Index,
-    offsets: NDArray[np.int64],
-    target: _Index,
-    chart_m: _Codes,
-    chart_v: _Codes,
-    log_tof: _Array,
-    t0: float,
-    step: float,
-    intervals: int,
-    home_first: int,
-    home_index: _Index,
-    home_m: _Codes,
-    home_v: _Codes,
-    home_log_tof: _Array,
-    distance: NDArray[np.float32],
-    distance_first: int,
+    closed: NDArray[np.bool_],
+    chart: Chart,
+    grid: Grid,
+    home: Home,
+    distance: tuple[int, NDArray[np.float32]],
     stretches: _Array,
-    limits: _Array,
-    weights: _Array,
-    out_row: _Index,
-    out_parent: _Index,
-    out_arr: _Array,
-    out_mass: _Array,
-    out_score: _Array,
-    out_home: _Array,
+    limits: tuple[float, float, float, float, float],
+    craft: Craft,
+    weights: tuple[float, float],
+    out: tuple[_Index, _Index, _Array, _Array, _Array, _Array],
 ) -> int:
     """Write all children of a rank and return how many; as many as there is room for.
 
-    `limits` are the longest duration, the stay, the longest flight (days), the dry and first
-    mass (kg), thrust (N), exhaust velocity (m/s), the reserve in log(m*), and the shares of the
-    duration after which a way home is looked for, and has to be there. `weights` are those of
-    the propellant and of the distance from the end. Without ways home tours may end anywhere.
+    `nodes` are rows, epochs from which they are ready, first departures and masses; `own` their
+    bodies. `limits` are the longest duration, the stay, the longest flight (days), and the shares
+    of the duration after which a way home is looked for, and has to be there. `weights` are those
+    of the propellant and of the distance from the end, which `distance` has from an interval on.
+    Without ways home tours may end anywhere. `out` gets rows, parents, arrivals, masses, scores
+    and durations of tours that go to the end from there.
     """
-    duration, stay, longest = limits[0], limits[1], limits[2]
-    m_dry, m_first, thrust, exhaust = limits[3], limits[4], limits[5], limits[6]
-    reserve, homeward, must = limits[7], limits[8], limits[9]
-    w_mass, w_distance = weights[0], weights[1]
+    row, ready, first, mass = nodes
+    offsets, target, m_star, delta_v, log_tof = chart
+    t0, step, intervals = grid
+    duration, stay, longest, homeward, must = limits
+    m_dry, m_first, thrust, exhaust, reserve = craft
+    w_mass, w_distance = weights
+    out_row, out_parent, out_arrival, out_mass, out_score, out_home = out
     total = 1.0 + w_mass
-    n = len(closed)
-    ends = home_index.shape[0] > 0
+    ends = home[1].shape[0] > 0
     end_stay = stay if ends else 0.0
     count = 0
     for i in range(len(row)):
@@ -196,39 +191,28 @@ def expand(
         if k < 0 or k >= intervals:
             continue
         share = place - k
-        base = k * n + row[i]
-        end_k = round((first[i] + duration - t0) / step) - distance_first
-        end_k = min(max(end_k, 0), distance.shape[0] - 1)
+        base = k * len(closed) + row[i]
+        end_k = round((first[i] + duration - t0) / step) - distance[0]
+        end_k = min(max(end_k, 0), distance[1].shape[0] - 1)
         level = math.log(mass[i]) + reserve
         for p in range(offsets[base], offsets[base + 1]):
             j = target[p]
-            if closed[j]:
+            if closed[j] or _is_among(own[i], j):
                 continue
-            seen = False
-            for d in range(own.shape[1]):
-                if own[i, d] == j:
-                    seen = True
-                    break
-            if seen:
-                continue
-            least = shortest_flight(chart_m[p], share, log_tof, level)
-            if least >= NEVER:
-                continue
-            for s in range(len(stretches)):
-                at = least + stretches[s]
+            least = shortest_flight(m_star[p], share, log_tof, level)
+            for stretch in stretches:
+                at = least + stretch
                 if at > log_tof[-1]:
                     break
                 tof = math.exp(at)
-                if tof > longest:
-                    break
                 arrival = ready[i] + tof
                 elapsed = arrival - first[i]
-                if elapsed + end_stay > duration:
+                if tof > longest or elapsed + end_stay > duration:
                     break
                 after = mass_after(
                     mass[i],
-                    value_at(chart_m[p], share, log_tof, at),
-                    value_at(chart_v[p], share, log_tof, at),
+                    value_at(m_star[p], share, log_tof, at),
+                    value_at(delta_v[p], share, log_tof, at),
                     tof * 86400.0,
                     thrust,
                     exhaust,
@@ -239,37 +223,18 @@ def expand(
                 days = NEVER
                 if ends and part > homeward:
                     left = duration - elapsed - stay
-                    days = home_days(
-                        arrival + stay,
-                        after,
-                        j,
-                        left,
-                        t0,
-                        step,
-                        home_first,
-                        home_index,
-                        home_m,
-                        home_v,
-                        home_log_tof,
-                        reserve,
-                        m_dry,
-                        thrust,
-                        exhaust,
-                    )
+                    days = home_days(arrival + stay, after, j, left, grid, home, craft)
                     if days > left and part > must:
                         continue
                 time_left = max(1.0 - part, _LEAST)
                 mass_left = max((after - m_dry) / (m_first - m_dry), _LEAST)
                 score = total - total * total / (1.0 / time_left + w_mass / mass_left)
-                score += w_distance * part * part * float(distance[end_k, j])
+                score += w_distance * part * part * float(distance[1][end_k, j])
                 if count == len(out_row):
                     return count
-                out_row[count] = j
-                out_parent[count] = i
-                out_arr[count] = arrival
-                out_mass[count] = after
-                out_score[count] = score
-                out_home[count] = elapsed + stay + days
+                out_row[count], out_parent[count] = j, i
+                out_arrival[count], out_mass[count] = arrival, after
+                out_score[count], out_home[count] = score, elapsed + stay + days
                 count += 1
     return count
 

@@ -138,22 +138,14 @@ class Homing:
         self._maker = maker
         self._problem = problem
         craft = problem.spacecraft
-        self._limits = np.array(
-            [
-                problem.max_duration_days,
-                problem.min_stay_days,
-                _LONGEST_DAYS,
-                _LIGHTEST * craft.m_dry,
-                problem.m0,
-                craft.thrust,
-                craft.exhaust_velocity,
-                np.log1p(reserve),
-                _HOMEWARD_SHARE,
-                _HOMEWARD_SHARE,
-            ]
+        self._duration = problem.max_duration_days
+        self._craft = (
+            _LIGHTEST * craft.m_dry,
+            problem.m0,
+            float(craft.thrust),
+            float(craft.exhaust_velocity),
+            float(np.log1p(reserve)),
         )
-        self._fine_limits = self._limits.copy()
-        self._fine_limits[-1] = _FINE_MUST_SHARE
         # Sums of random keys tell sets of bodies apart.
         self._keys = np.random.default_rng(0).integers(
             1, np.iinfo(np.uint64).max, len(chart.rows), dtype=np.uint64
@@ -233,9 +225,9 @@ class Homing:
 
     def _ways(self, end: int, starts: Nodes, thorough: bool) -> Ways:
         """Return the legs to the end, for all times at which tours may end."""
-        begin = float(starts.t_first_mjd2000.min()) + _HOMEWARD_SHARE * self._limits[0]
+        begin = float(starts.t_first_mjd2000.min()) + _HOMEWARD_SHARE * self._duration
         first = self.chart.interval(begin)
-        last = self.chart.interval(float(starts.t_first_mjd2000.max()) + self._limits[0])
+        last = self.chart.interval(float(starts.t_first_mjd2000.max()) + self._duration)
         if not thorough:
             return self.chart.ways(end, first, last)
         if self._known is None or self._known[0] != (end, first, last):
@@ -244,7 +236,7 @@ class Homing:
 
     def _distances(self, starts: Nodes, end: int) -> tuple[int, NDArray[np.float32]]:
         """Return (k, n) how far bodies are from the end when tours end, from an interval on."""
-        last = starts.t_first_mjd2000 + self._limits[0]
+        last = starts.t_first_mjd2000 + self._duration
         first = self.chart.interval(float(last.min()))
         points = self.chart.points[first : self.chart.interval(float(last.max())) + 2]
         away = np.sqrt(((points - points[:, end, None]) ** 2).sum(axis=2))
@@ -265,37 +257,20 @@ class Homing:
         room = int((chart.offsets[entry + 1] - chart.offsets[entry]).sum()) * len(stretches)
         row, parent = np.empty(room, dtype=np.int32), np.empty(room, dtype=np.int32)
         arrival, mass, score, home = (np.empty(room) for _ in range(4))
+        must = _FINE_MUST_SHARE if settings.fine else _HOMEWARD_SHARE
         count = expand(
-            rank.row,
-            rank.ready,
-            rank.first_departure,
-            rank.mass,
-            closed,
+            (rank.row, rank.ready, rank.first_departure, rank.mass),
             rank.own,
-            chart.offsets,
-            chart.target,
-            chart.m_star,
-            chart.delta_v,
-            np.log(TOF_DAYS),
-            chart.t0_mjd2000,
-            STEP_DAYS,
-            chart.intervals,
-            ways.first,
-            ways.index,
-            ways.m_star,
-            ways.delta_v,
-            ways.log_tof,
-            distance[1],
-            distance[0],
+            closed,
+            (chart.offsets, chart.target, chart.m_star, chart.delta_v, np.log(TOF_DAYS)),
+            (chart.t0_mjd2000, STEP_DAYS, chart.intervals),
+            (ways.first, ways.index, ways.m_star, ways.delta_v, ways.log_tof),
+            distance,
             stretches,
-            self._fine_limits if settings.fine else self._limits,
-            np.array([settings.propellant_weight, settings.distance_weight]),
-            row,
-            parent,
-            arrival,
-            mass,
-            score,
-            home,
+            (self._duration, self._problem.min_stay_days, _LONGEST_DAYS, _HOMEWARD_SHARE, must),
+            self._craft,
+            (settings.propellant_weight, settings.distance_weight),
+            (row, parent, arrival, mass, score, home),
         )
         return Children(
             *(row[:count], parent[:count], arrival[:count]),
@@ -332,7 +307,7 @@ class Homing:
     ) -> list[Homecoming]:
         """Return the best ends of a rank of children, as tours."""
         order = np.argsort(children.home, kind="stable")[: _LOOKED_AT * count]
-        order = order[children.home[order] <= self._limits[0]]
+        order = order[children.home[order] <= self._duration]
         parent = children.parent[order]
         kinds = ranks[-1].sets[parent] + self._keys[children.row[order]]
         first = np.unique(kinds, return_index=True)[1]
