@@ -171,7 +171,7 @@ def expand(
     bodies. `limits` are the longest duration, the stay, the longest flight (days), and the shares
     of the duration after which a way home is looked for, and has to be there. `weights` are those
     of the propellant and of the distance from the end, which `distance` has from an interval on.
-    Without ways home tours may end anywhere. `out` gets rows, parents, arrivals, masses, scores
+    `out` gets rows, parents, arrivals, masses, scores
     and durations of tours that go to the end from there.
     """
     row, ready, first, mass = nodes
@@ -182,8 +182,6 @@ def expand(
     w_mass, w_distance = weights
     out_row, out_parent, out_arrival, out_mass, out_score, out_home = out
     total = 1.0 + w_mass
-    ends = home[1].shape[0] > 0
-    end_stay = stay if ends else 0.0
     count = 0
     for i in range(len(row)):
         place = (ready[i] - t0) / step
@@ -207,7 +205,7 @@ def expand(
                 tof = math.exp(at)
                 arrival = ready[i] + tof
                 elapsed = arrival - first[i]
-                if tof > longest or elapsed + end_stay > duration:
+                if tof > longest or elapsed + stay > duration:
                     break
                 after = mass_after(
                     mass[i],
@@ -221,7 +219,7 @@ def expand(
                     continue
                 part = elapsed / duration
                 days = NEVER
-                if ends and part > homeward:
+                if part > homeward:
                     left = duration - elapsed - stay
                     days = home_days(arrival + stay, after, j, left, grid, home, craft)
                     if days > left and part > must:

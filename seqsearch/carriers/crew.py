@@ -191,14 +191,25 @@ def find_probe(
 ) -> Flight | None:
     """Return the best tour of one probe that can be flown in time; None for none."""
     own = probe_problem(problem, plan, problem.max_duration_days)
-    tours = [
+    tours = _predicted(screen, plan, avoid, settings, offset_days, weights)
+    return _best_fitted(own, tours, None)
+
+
+def _predicted(
+    screen: Screen,
+    plan: Plan,
+    avoid: Sequence[int],
+    settings: HomingSettings,
+    offset_days: float,
+    weights: tuple[float, ...],
+) -> list[Homecoming]:
+    return [
         tour
         for weight in weights
         for tour in screen.tours(
-            plan, replace(settings, propellant_weight=weight), tuple(avoid), offset_days
+            plan, replace(settings, propellant_weight=weight), avoid, offset_days
         )
     ]
-    return _best_fitted(own, tours, None)
 
 
 def find_again(
@@ -217,15 +228,9 @@ def find_again(
     own = own_problem(problem, crew, number)
     begin, end = own.first_departure_mjd2000
     plan = replace(crew.plan, window_mjd2000=begin)
-    tours = [
-        tour
-        for weight in weights
-        for tour in screen.tours(
-            plan, replace(settings, propellant_weight=weight), tuple(avoid), offset_days
-        )
-        if tour.itinerary.t_dep_mjd2000[0] < end
-    ]
-    return _best_fitted(own, tours, None)
+    tours = _predicted(screen, plan, avoid, settings, offset_days, weights)
+    in_time = [tour for tour in tours if tour.itinerary.t_dep_mjd2000[0] < end]
+    return _best_fitted(own, in_time, None)
 
 
 def _best_fitted(

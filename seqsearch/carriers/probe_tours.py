@@ -21,9 +21,6 @@ RELEASE_ID: Final = 10_000_001
 CAPTURE_ID: Final = 10_000_002
 """Ids of the mother ship's orbits, which no asteroid has."""
 
-_HEAVIEST_KG: Final = 1e6
-"""What tours say at most of m*: between two bodies that are together anything can be flown."""
-
 
 def probe_config(config: Config, catalogue: Catalogue, crew: Crew, number: int) -> Config:
     """Return the problem file of one probe of a crew.
@@ -113,12 +110,7 @@ def probe_tour(config: Config, catalogue: Catalogue, crew: Crew, number: int) ->
     flight = fly(problem, Itinerary(rows, np.array(t_dep), np.array(tof)))
     if flight is None:
         raise InputError(f"probe {number + 1}: a leg has no solution")
-    tour = flight.to_tour(problem)
-    legs = tuple(
-        msgspec.structs.replace(leg, m_star_kg=min(leg.m_star_kg, _HEAVIEST_KG))
-        for leg in tour.legs
-    )
-    return msgspec.structs.replace(tour, legs=legs)
+    return flight.to_tour(problem)
 
 
 def _orbit(catalogue: Catalogue, row: int, body_id: int, name: str) -> BodyTable:

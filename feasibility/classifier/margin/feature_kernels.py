@@ -12,6 +12,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from feasibility.classifier.margin.lanes.math_kernels import sine_cosine
 from feasibility.classifier.margin.path_kernels import (
     N_NODES,
     SATURATED,
@@ -21,7 +22,6 @@ from feasibility.classifier.margin.path_kernels import (
     flown_path,
     gauss_rows,
     impulse_effects,
-    sine_cosine,
     smallest_impulse,
     workspace,
 )

@@ -30,7 +30,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.classifier.margin.lanes.math_kernels import inverse_cube_root
+from feasibility.classifier.margin.lanes.math_kernels import inverse_cube_root, sine_cosine
 from feasibility.runtime.jit import inner_kernel, kernel, lane_function, summing_kernel
 
 _Array = NDArray[np.float64]
@@ -45,41 +45,9 @@ STRIDE = 24
 SATURATED = 1e3
 """Stands for an impulse of a segment that is beyond all use, or cannot be estimated."""
 
-_TWO_OVER_PI = 2.0 / math.pi
-_HALF_PI_HEAD = 1.5707963267341256
-_HALF_PI_TAIL = 6.077100506506192e-11
-_ROUND = 1.5 * 2.0**52
 _LEAST_MOTION = 0.15
 _LARGEST_ECCENTRICITY2 = 0.9**2
 _SINGULAR = 1e-14
-
-
-@lane_function
-def sine_cosine(x: float) -> tuple[float, float]:
-    """Return sine and cosine to 1e-13, in arithmetic alone, so that a loop becomes vectors.
-
-    Series about the nearest multiple of a right angle, whose last bits Cody and Waite's two
-    parts of pi / 2 keep; adding and subtracting _ROUND rounds to a whole number.
-    """
-    quarter = (x * _TWO_OVER_PI + _ROUND) - _ROUND
-    r = (x - quarter * _HALF_PI_HEAD) - quarter * _HALF_PI_TAIL
-    z = r * r
-    # Pairs of terms, not one after the other, as each waits for the one before.
-    z2 = z * z
-    s = (1.0 / 362880.0 - z * (1.0 / 39916800.0)) + z2 * (1.0 / 6227020800.0)
-    s = (1.0 - z * (1.0 / 6.0)) + z2 * ((1.0 / 120.0 - z * (1.0 / 5040.0)) + z2 * s)
-    s *= r
-    c = (1.0 / 40320.0 - z * (1.0 / 3628800.0)) + z2 * (1.0 / 479001600.0)
-    c = (1.0 - z * 0.5) + z2 * ((1.0 / 24.0 - z * (1.0 / 720.0)) + z2 * c)
-    # Which quarter, from -2 to 2.
-    place = quarter - 4.0 * ((0.25 * quarter + _ROUND) - _ROUND)
-    odd = abs(place) == 1.0
-    sine = c if odd else s
-    cosine = s if odd else c
-    # Of five places these have the signs turned: sine -2, -1, 2; cosine -2, 1, 2.
-    sine = -sine if abs(place - 0.25) > 1.0 else sine
-    cosine = -cosine if abs(place + 0.25) > 1.0 else cosine
-    return sine, cosine
 
 
 @lane_function

@@ -8,7 +8,6 @@ from scipy.spatial.transform import Rotation
 
 from feasibility import Legs
 from feasibility.classifier.margin import feature_kernels as kernels
-from feasibility.classifier.margin import path_kernels
 from feasibility.classifier.margin.features import (
     DOMAIN_QUANTITIES,
     FEATURES,
@@ -18,6 +17,7 @@ from feasibility.classifier.margin.features import (
     margin_features,
     quick_features,
 )
+from feasibility.classifier.margin.lanes import math_kernels
 from feasibility.classifier.margin.lanes.rendezvous_kernels import quick_lane_batch
 from feasibility.classifier.margin.path_kernels import (
     STRIDE,
@@ -124,7 +124,7 @@ def test_the_unit_of_acceleration_is_that_of_the_departure_orbit():
 @kernel
 def sine_cosine(x):
     """Python cannot call what becomes a part of loops."""
-    return path_kernels.sine_cosine(x)
+    return math_kernels.sine_cosine(x)
 
 
 @given(x=st.floats(-1e4, 1e4))

@@ -13,10 +13,10 @@ from seqsearch.carriers.campaign import CampaignState
 from seqsearch.carriers.crew import MISSION_DAYS, WAIT_DAYS, Crew, fitted, own_problem
 from seqsearch.carriers.crew_schedule import schedule_of
 from seqsearch.carriers.flight import captures_of, carrier_of, releases_of
-from seqsearch.carriers.joint import Wishes, joined
+from seqsearch.carriers.joint import LATE_DAYS, Wishes, _gap, joined
 from seqsearch.carriers.mother import later_budget, next_orbits
 from seqsearch.carriers.plans import Plan, Screen
-from seqsearch.carriers.schedule import Act
+from seqsearch.carriers.schedule import Act, Step
 from seqsearch.carriers.state_files import read_state, write_state
 from seqsearch.polish.itinerary import Itinerary
 from seqsearch.problems.gtoc7.rules import carrier_rules
@@ -183,6 +183,23 @@ def test_those_that_stay_are_released_first_and_caught_at_rest(screen, polished)
     itinerary = polished.flights[second].itinerary
     assert captures[second] >= itinerary.t_arr_mjd2000[-1] + WAIT_DAYS - 1e-6
     assert captures[second] - releases[second] <= MISSION_DAYS
+
+
+def test_she_stays_for_a_day_after_one_that_is_caught_at_rest(polished):
+    """With continuous thrust it may come hours later."""
+    caught = polished.course.stay_epochs[1]
+    later = [i.t_mjd2000 - caught for i in polished.course.impulses if i.t_mjd2000 > caught]
+    assert min(later, default=LATE_DAYS) >= LATE_DAYS - 1e-6
+    assert _gap(Step(Act.CAPTURE, 0.0, 1, stays=True), Step(Act.IMPULSE, 9.0)) == LATE_DAYS
+
+
+def test_a_release_before_the_window_of_the_plan_is_one_of_the_course(problem, polished):
+    """She may be on a coast, and off it, before the plan's window begins."""
+    end = max(impulse.t_mjd2000 for impulse in polished.course.impulses)
+    late = replace(polished, plan=replace(polished.plan, window_mjd2000=end + 500.0))
+    for number, flight in enumerate(late.flights):
+        begin, last = own_problem(problem, late, number).first_departure_mjd2000
+        assert begin <= flight.itinerary.t_dep_mjd2000[0] <= last
 
 
 def test_a_schedule_is_in_order_and_begins_with_what_there_is(screen, crew):

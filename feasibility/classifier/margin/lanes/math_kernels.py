@@ -60,7 +60,11 @@ def exp(x: float) -> float:
 
 @lane_function
 def sine_cosine(x: float) -> tuple[float, float]:
-    """Return sine and cosine, as `path_kernels.sine_cosine` does."""
+    """Return sine and cosine to 1e-13, in arithmetic alone, so that a loop becomes vectors.
+
+    Series about the nearest multiple of a right angle, whose last bits Cody and Waite's two
+    parts of pi / 2 keep; adding and subtracting _ROUND rounds to a whole number.
+    """
     quarter = (x * _TWO_OVER_PI + _ROUND) - _ROUND
     r = (x - quarter * _HALF_PI_HEAD) - quarter * _HALF_PI_TAIL
     z = r * r
@@ -71,10 +75,12 @@ def sine_cosine(x: float) -> tuple[float, float]:
     s *= r
     c = (1.0 / 40320.0 - z * (1.0 / 3628800.0)) + z2 * (1.0 / 479001600.0)
     c = (1.0 - z * 0.5) + z2 * ((1.0 / 24.0 - z * (1.0 / 720.0)) + z2 * c)
+    # Which quarter, from -2 to 2.
     place = quarter - 4.0 * ((0.25 * quarter + _ROUND) - _ROUND)
     odd = abs(place) == 1.0
     sine = c if odd else s
     cosine = s if odd else c
+    # Of five places these have the signs turned: sine -2, -1, 2; cosine -2, 1, 2.
     sine = -sine if abs(place - 0.25) > 1.0 else sine
     cosine = -cosine if abs(place + 0.25) > 1.0 else cosine
     return sine, cosine
