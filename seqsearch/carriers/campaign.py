@@ -1,14 +1,14 @@
 """`Campaign`: the whole search for a mother ship's flight and the tours of her probes.
 
 Stages: chart all legs; rate plans that keep to one orbit, roughly and then better; look for second
-orbits; rate the best with wide beams; find the tours of all probes for those; improve the best
-crews. What each stage found is kept in a `CampaignState`.
+orbits, and for third ones; rate the best with wide beams; find the tours of all probes for those;
+improve the best crews. What each stage found is kept in a `CampaignState`.
 """
 
 import functools
 import pickle
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
 from typing import Any, Final, final
@@ -16,11 +16,12 @@ from typing import Any, Final, final
 import numpy as np
 
 from feasibility.runtime.cluster import shared
+from seqsearch.carriers.chains import chained_plans
 from seqsearch.carriers.chart_files import has_chart, write_chart
 from seqsearch.carriers.crew import (
     Crew,
-    find_again,
     find_crew,
+    find_probe,
     polished_probe,
     rebuilt_probe,
     repaired_probe,
@@ -43,7 +44,7 @@ _CREWS: Final = HomingSettings(width=2000, results=12)
 _KEPT_PLANS: Final = 5000
 """Plans that are kept of each stage."""
 
-_BATCHES: Final = (60, 12, 12, 2)
+_BATCHES: Final = (60, 12, 12, 1, 2)
 """Plans in a task of each stage that rates: a task takes half a second and more."""
 
 _TWO_ANEW: Final = 0.2
@@ -58,7 +59,7 @@ _JOINED: Final = (0.1, 0.05)
 _WIDTHS: Final = (300.0, 5000.0)
 """Widths of beams that improve a tour."""
 
-_SHARES: Final = (0.15, 0.22, 0.3, 0.42, 0.6)
+_SHARES: Final = (0.15, 0.2, 0.26, 0.36, 0.48, 0.66)
 """Shares of a time limit after which the stages before improving end."""
 
 
@@ -71,8 +72,8 @@ class CampaignSettings:
     ----------
     rated, sifted : int
         Plans with one orbit that are rated roughly, and better.
-    continued : int
-        Plans for which second orbits are looked for.
+    continued, chained : int
+        Plans for which second orbits are looked for, and third ones.
     judged : int
         Plans that are rated with wide beams.
     manned : int
@@ -90,6 +91,7 @@ class CampaignSettings:
     rated: int = 100_000
     sifted: int = 4000
     continued: int = 150
+    chained: int = 150
     judged: int = 600
     manned: int = 150
     improvements: int = 400
@@ -111,7 +113,7 @@ class CampaignState:
         Wall-clock time of all sessions; None for no limit.
     catalogue_sha256 : str
         Which asteroid table it is.
-    rated, sifted, continued, judged : list of Plan
+    rated, sifted, continued, chained, judged : list of Plan
         The best of each stage that rates, best first.
     looked : list of int
         How many plans were rated in each of these stages.
@@ -133,8 +135,9 @@ class CampaignState:
     rated: list[Plan] = field(default_factory=list)
     sifted: list[Plan] = field(default_factory=list)
     continued: list[Plan] = field(default_factory=list)
+    chained: list[Plan] = field(default_factory=list)
     judged: list[Plan] = field(default_factory=list)
-    looked: list[int] = field(default_factory=lambda: [0, 0, 0, 0])
+    looked: list[int] = field(default_factory=lambda: [0, 0, 0, 0, 0])
     manned: int = 0
     tried: int = 0
     launch_share: float = 1.0
@@ -182,6 +185,7 @@ class Campaign:
         on_step: Callable[[CampaignState, str], None],
     ) -> None:
         self._context = _Context(screen, problem)
+        self._probes = screen.rules.craft_count
         self._settings = settings
         self._executor = executor
         self._at_once = max(2, 2 * workers)
@@ -193,7 +197,14 @@ class Campaign:
         self._begin = time.monotonic() - state.spent_s
         self._limit_s = state.limit_s
         self._chart(state)
-        for stage in (self._rate, self._continue, self._judge, self._man, self._improve):
+        for stage in (
+            self._rate,
+            self._continue,
+            self._chain,
+            self._judge,
+            self._man,
+            self._improve,
+        ):
             stage(state)
 
     def _chart(self, state: CampaignState) -> None:
@@ -219,8 +230,9 @@ class Campaign:
             plans = self._context.screen.candidates(offset)
             some = rng.permutation(len(plans))[: settings.rated]
             plans = [plans[k] for k in some]
-            self._stage(state, 0, plans, state.rated, _ROUGH, "rated")
-        self._stage(state, 1, state.rated[: settings.sifted], state.sifted, _BETTER, "rated again")
+            self._stage(state, 0, plans, state.rated, _rating(_ROUGH, 1), "rated")
+        better = _rating(_BETTER, self._probes)
+        self._stage(state, 1, state.rated[: settings.sifted], state.sifted, better, "rated again")
 
     def _continue(self, state: CampaignState) -> None:
         """Look for second orbits, for the best plan of each first one."""
@@ -229,12 +241,19 @@ class Campaign:
         if not _is_over(state, 2):
             for others in self._all(_continued, [(plan,) for plan in best]):
                 plans += others
-        self._stage(state, 2, plans, state.continued, _BETTER, "continued")
+        better = _rating(_BETTER, self._probes)
+        self._stage(state, 2, plans, state.continued, better, "continued")
+
+    def _chain(self, state: CampaignState) -> None:
+        """Look for third orbits, for the best plan of each first one."""
+        best = _best_of_first([*state.continued, *state.sifted])[: self._settings.chained]
+        self._stage(state, 3, best, state.chained, _chained, "chained")
 
     def _judge(self, state: CampaignState) -> None:
         """Rate the best with wide beams."""
-        plans = _different([*state.continued, *state.sifted])[: self._settings.judged]
-        self._stage(state, 3, plans, state.judged, _WIDE, "judged")
+        plans = _different([*state.chained, *state.continued, *state.sifted])
+        wide = _rating(_WIDE, self._probes)
+        self._stage(state, 4, plans[: self._settings.judged], state.judged, wide, "judged")
 
     def _stage(
         self,
@@ -242,14 +261,13 @@ class Campaign:
         stage: int,
         plans: Sequence[Plan],
         found: list[Plan],
-        beams: HomingSettings,
+        rate: "_Rate",
         name: str,
     ) -> None:
         """Rate plans from where the stage is, keep the best."""
         if _is_over(state, stage):
             return
         deadline, size = self._until(_SHARES[stage]), _BATCHES[stage]
-        probes = 1 if stage == 0 else self._context.screen.rules.craft_count
         while state.looked[stage] < len(plans):
             if deadline.passed() and found:
                 return
@@ -259,7 +277,7 @@ class Campaign:
                 for at in range(first, first + size * self._at_once, size)
                 if at < len(plans)
             ]
-            for valued in self._all(_valued, [(batch, beams, probes) for batch in batches]):
+            for valued in self._all(_valued, [(batch, rate) for batch in batches]):
                 found += [plan for plan in valued if plan.value > 0.0]
             state.looked[stage] += sum(map(len, batches))
             found.sort(key=lambda plan: -plan.value)
@@ -269,7 +287,7 @@ class Campaign:
             self._report(state, line)
 
     def _man(self, state: CampaignState) -> None:
-        deadline = self._until(_SHARES[4])
+        deadline = self._until(_SHARES[5])
         plans = state.judged[: self._settings.manned]
         while state.manned < len(plans):
             if deadline.passed() and state.crews:
@@ -356,16 +374,29 @@ def _continued(context: _Context, plan: Plan) -> list[Plan]:
     return context.screen.continued(plan)
 
 
-def _valued(
-    context: _Context, plans: Sequence[Plan], beams: HomingSettings, probes: int
-) -> list[Plan]:
-    return [context.screen.valued(plan, beams, probes) for plan in plans]
+_Rate = Callable[[Screen, Plan], list[Plan]]
+"""Gives what becomes of a plan: itself with a value, or plans that go on from it."""
+
+
+def _rating(beams: HomingSettings, probes: int) -> _Rate:
+    return functools.partial(_with_value, beams=beams, probes=probes)
+
+
+def _with_value(screen: Screen, plan: Plan, *, beams: HomingSettings, probes: int) -> list[Plan]:
+    return [screen.valued(plan, beams, probes)]
+
+
+def _chained(screen: Screen, plan: Plan) -> list[Plan]:
+    return chained_plans(screen, plan, _BETTER)
+
+
+def _valued(context: _Context, plans: Sequence[Plan], rate: _Rate) -> list[Plan]:
+    return [found for plan in plans for found in rate(context.screen, plan)]
 
 
 def _manned(context: _Context, plan: Plan, settings: HomingSettings) -> Crew | None:
-    count = context.screen.rules.craft_count
-    crew = find_crew(context.screen, context.problem, plan, count, settings)
-    return crew if len(crew.flights) == count else None
+    crew = find_crew(context.screen, context.problem, plan, settings)
+    return crew if len(crew.flights) == len(plan.ends) else None
 
 
 def _improved(context: _Context, crew: Crew, number: int, seed: int) -> Crew | None:
@@ -386,7 +417,7 @@ def _improved(context: _Context, crew: Crew, number: int, seed: int) -> Crew | N
         other = int((number + rng.integers(1, len(crew.flights))) % len(crew.flights))
         closed = crew.closed(number, other)
         for probe in (other, number):
-            found = find_again(screen, problem, crew, probe, closed, settings, offset, weights)
+            found = find_probe(screen, problem, crew, probe, closed, settings, offset, weights)
             if found is None:
                 return None
             crew = crew.with_flight(probe, found)
@@ -394,7 +425,7 @@ def _improved(context: _Context, crew: Crew, number: int, seed: int) -> Crew | N
         return crew
     if kind < _TWO_ANEW + _ANEW:
         closed = crew.closed(number)
-        flight = find_again(screen, problem, crew, number, closed, settings, offset, weights)
+        flight = find_probe(screen, problem, crew, number, closed, settings, offset, weights)
     elif kind < _TWO_ANEW + _ANEW + _REBUILT:
         kept = int(rng.integers(1, len(crew.flights[number].itinerary) - 2))
         flight = rebuilt_probe(screen, problem, crew, number, kept, settings)
@@ -418,11 +449,20 @@ def _there(context: bytes, task: Callable[..., Any], call: tuple[Any, ...]) -> A
 
 def _different(plans: list[Plan]) -> list[Plan]:
     """Return plans of different orbits, best first."""
-    seen: set[tuple[int, int]] = set()
+    return _best_by(plans, lambda plan: (plan.orbits, plan.ends))
+
+
+def _best_of_first(plans: list[Plan]) -> list[Plan]:
+    """Return plans of different first orbits, best first."""
+    return _best_by(plans, lambda plan: plan.first)
+
+
+def _best_by(plans: list[Plan], kind: Callable[[Plan], Hashable]) -> list[Plan]:
+    seen: set[Hashable] = set()
     chosen = []
     for plan in sorted(plans, key=lambda plan: -plan.value):
-        if (plan.first, plan.second) not in seen:
-            seen.add((plan.first, plan.second))
+        if kind(plan) not in seen:
+            seen.add(kind(plan))
             chosen.append(plan)
     return chosen
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from feasibility.classifier.predictor import LegPredictor
 from seqsearch.carriers.course import Course
 from seqsearch.carriers.homing import Homecoming, HomingSettings
-from seqsearch.carriers.plans import SPREAD_DAYS, STAY_DAYS, Plan, Screen
+from seqsearch.carriers.plans import STAY_DAYS, Plan, Screen
 from seqsearch.core.nodes import Nodes
 from seqsearch.polish import PolishSettings, polish
 from seqsearch.polish.flight import Flight, fly
@@ -64,17 +64,17 @@ _VISIT_DAYS: Final = 170.0
 @final
 @dataclass(frozen=True, eq=False)
 class Crew:
-    """Tours from the first orbit to the second, each flown by the leg solver.
+    """Tours from the first orbit of a plan to its others, each flown by the leg solver.
 
     Attributes
     ----------
     plan : Plan
         The orbits.
     flights : tuple of Flight
-        One a probe. The first and the last row of each are the orbits.
+        One a probe. The first and the last row of each are orbits.
     course : Course, optional
         What the mother ship does in between; default: she releases all probes on the first orbit
-        and catches them on the second one. On a course each probe has orbits of its own, which
+        and catches them on those of the plan. On a course each probe has orbits of its own, which
         take the place of the asteroids' in `own_problem`.
     """
 
@@ -113,39 +113,41 @@ class Crew:
             for row in flight.itinerary.rows[1:-1]
         )
 
-    def waits(self) -> tuple[int | None, int | None]:
-        """Return the probes that stay at the asteroids of the first and the second orbit.
+    def waits(self) -> tuple[int | None, ...]:
+        """Return the probes that stay at the asteroids of all orbits.
 
-        None where no probe has the time, or where the orbits are the same one. On a course only
-        those that it provides for.
+        At that of the first one after its release, at the others before the capture. None where
+        no probe has the time. On a course only those that it provides for.
         """
         slack = [MISSION_DAYS - flight.itinerary.duration_days for flight in self.flights]
-        numbers: list[int | None] = [*range(len(slack)), None]
-        course = self.course
-        ways = [numbers, numbers] if course is None else [[k, None] for k in course.stays]
-        best: tuple[int | None, int | None] = (None, None)
+        course, plan = self.course, self.plan
+        ways: list[list[int | None]] = [
+            [k for k in range(len(slack)) if orbit in (0, plan.ends[k])]
+            for orbit in range(len(plan.orbits))
+        ]
+        if course is not None:
+            ways = [[stay] for stay in course.stays]
+        best: tuple[int | None, ...] = (None,) * len(ways)
         value = (0, -np.inf)
-        for first, second in product(*ways):
-            if self.plan.first == self.plan.second and second is not None:
-                continue
+        for probes in product(*[[*way, None] for way in ways]):
             left = list(slack)
-            for probe, days in ((first, self._wait_days(0)), (second, self._wait_days(1))):
+            for orbit, probe in enumerate(probes):
                 if probe is not None:
-                    left[probe] -= days
-            count = (first is not None) + (second is not None)
+                    left[probe] -= self._wait_days(orbit)
+            count = sum(probe is not None for probe in probes)
             if min(left, default=0.0) >= 0.0 and (count, min(left, default=0.0)) > value:
-                best, value = (first, second), (count, min(left, default=0.0))
+                best, value = probes, (count, min(left, default=0.0))
         return best
 
-    def _wait_days(self, side: int) -> float:
-        """Return what it costs to stay at the first or second asteroid; inf where that is late."""
+    def _wait_days(self, orbit: int) -> float:
+        """Return what it costs to stay at an orbit's asteroid; inf where that is late."""
         course = self.course
-        probe = None if course is None else course.stays[side]
+        probe = None if course is None else course.stays[orbit]
         if course is None or probe is None:
             return WAIT_DAYS
         itinerary = self.flights[probe].itinerary
         begin, end = float(itinerary.t_dep_mjd2000[0]), float(itinerary.t_arr_mjd2000[-1])
-        days = begin - course.stay_epochs[0] if side == 0 else course.stay_epochs[1] - end
+        days = course.stay_epochs[orbit] - end if orbit else begin - course.stay_epochs[0]
         return days if days >= WAIT_DAYS - _ROUNDING_DAYS else np.inf
 
     def with_flight(self, number: int, flight: Flight) -> "Crew":
@@ -155,27 +157,19 @@ class Crew:
         return replace(self, flights=tuple(flights))
 
 
-def probe_problem(
-    problem: RendezvousProblem, plan: Plan, duration_days: float
-) -> RendezvousProblem:
-    """Return the problem of one probe of a plan, of which retiming keeps the limits."""
-    window = (plan.window_mjd2000, plan.window_mjd2000 + SPREAD_DAYS)
-    return replace(problem, first_departure_mjd2000=window, max_duration_days=duration_days)
-
-
 def own_problem(problem: RendezvousProblem, crew: Crew, number: int) -> RendezvousProblem:
     """Return the problem of one probe of a crew; on a course it has orbits of its own."""
     plan, course = crew.plan, crew.course
-    own = probe_problem(problem, plan, problem.max_duration_days)
+    allowed = plan.windows_mjd2000[number]
     if course is None:
-        return own
+        return replace(problem, first_departure_mjd2000=allowed)
     begin, end = course.window(course.starts[number])
-    window = max(begin + TOUCH_DAYS, plan.window_mjd2000), end - TOUCH_DAYS
+    window = max(begin + TOUCH_DAYS, allowed[0]), end - TOUCH_DAYS
     # She may be there before the plan's window.
     departures = [float(f.itinerary.t_dep_mjd2000[0]) for f in crew.flights[number : number + 1]]
     return replace(
-        own,
-        catalogue=course.catalogue_for(problem.catalogue, plan.first, plan.second, number),
+        problem,
+        catalogue=course.catalogue_for(problem.catalogue, plan, number),
         first_departure_mjd2000=(min(*window, *departures), max(*window, *departures)),
     )
 
@@ -183,54 +177,45 @@ def own_problem(problem: RendezvousProblem, crew: Crew, number: int) -> Rendezvo
 def find_probe(
     screen: Screen,
     problem: RendezvousProblem,
-    plan: Plan,
+    crew: Crew,
+    number: int,
     avoid: Sequence[int],
     settings: HomingSettings,
     offset_days: float = 0.0,
     weights: tuple[float, ...] = WEIGHTS,
 ) -> Flight | None:
-    """Return the best tour of one probe that can be flown in time; None for none."""
-    own = probe_problem(problem, plan, problem.max_duration_days)
-    tours = _predicted(screen, plan, avoid, settings, offset_days, weights)
-    return _best_fitted(own, tours, None)
+    """Return the best tour of a probe of a crew that can be flown in time; None for none.
 
-
-def _predicted(
-    screen: Screen,
-    plan: Plan,
-    avoid: Sequence[int],
-    settings: HomingSettings,
-    offset_days: float,
-    weights: tuple[float, ...],
-) -> list[Homecoming]:
-    return [
+    Parameters
+    ----------
+    screen : Screen
+        Runs the beams.
+    problem : RendezvousProblem
+        One probe.
+    crew : Crew
+        Its plan and its course count; on a course the probe leaves from its own coast.
+    number : int
+        Which probe.
+    avoid : sequence of int
+        Rows that it leaves alone.
+    settings : HomingSettings
+        Of the beams.
+    offset_days : float
+        By how much the departures that are tried are moved.
+    weights : tuple of float
+        Of the propellant: a beam each.
+    """
+    own, plan = own_problem(problem, crew, number), crew.plan
+    if crew.course is not None:
+        plan = plan.with_window(number, own.first_departure_mjd2000)
+    tours = [
         tour
         for weight in weights
         for tour in screen.tours(
-            plan, replace(settings, propellant_weight=weight), avoid, offset_days
+            plan, number, replace(settings, propellant_weight=weight), avoid, offset_days
         )
     ]
-
-
-def find_again(
-    screen: Screen,
-    problem: RendezvousProblem,
-    crew: Crew,
-    number: int,
-    avoid: Sequence[int],
-    settings: HomingSettings,
-    offset_days: float,
-    weights: tuple[float, ...],
-) -> Flight | None:
-    """Return the best tour of a probe of a crew, as `find_probe`; on a course from its coast."""
-    if crew.course is None:
-        return find_probe(screen, problem, crew.plan, avoid, settings, offset_days, weights)
-    own = own_problem(problem, crew, number)
-    begin, end = own.first_departure_mjd2000
-    plan = replace(crew.plan, window_mjd2000=begin)
-    tours = _predicted(screen, plan, avoid, settings, offset_days, weights)
-    in_time = [tour for tour in tours if tour.itinerary.t_dep_mjd2000[0] < end]
-    return _best_fitted(own, in_time, None)
+    return _best_fitted(own, tours, None)
 
 
 def _best_fitted(
@@ -281,9 +266,9 @@ def rebuilt_probe(
         parent_id=np.array([-1]),
     )
     plan = crew.plan
-    avoid = np.unique([plan.first, plan.second, *crew.closed(number)])
+    avoid = np.unique([*plan.orbits, *crew.closed(number)])
     own = own_problem(problem, crew, number)
-    tails = screen.homing.run(node, plan.second, avoid, settings)
+    tails = screen.homing.run(node, plan.end(number), avoid, settings)
     tours = [replace(tail, itinerary=joined(head, tail.itinerary)) for tail in tails]
     best = _best_fitted(own, tours, before)
     return None if best is before else best
@@ -302,7 +287,7 @@ def repaired_probe(
     """
     before, plan = crew.flights[number], crew.plan
     visits = before.itinerary.rows[1:-1].tolist()
-    avoid = np.unique([plan.first, plan.second, *crew.closed(number)])
+    avoid = np.unique([*plan.orbits, *crew.closed(number)])
     own = own_problem(problem, crew, number)
     first = before.itinerary.t_dep_mjd2000[0] + rng.uniform(*_SHIFTS) + _SHIFTED
     window = own.first_departure_mjd2000
@@ -324,7 +309,7 @@ def repaired_probe(
                 if lost + more:
                     free = [None] * (lost + more)
                     steps = [*visits[:place], *free, *visits[place + lost :]]
-                    tours += screen.homing.run(starts, plan.second, avoid, settings, steps)
+                    tours += screen.homing.run(starts, plan.end(number), avoid, settings, steps)
     best = _best_fitted(own, tours, before)
     return None if best is before else best
 
@@ -347,13 +332,13 @@ def polished_probe(
 ) -> Flight | None:
     """Return a better tour of a probe by exchanges at both ends; None for none."""
     ids, plan = problem.catalogue.ids, crew.plan
-    ends = int(ids[plan.first]), int(ids[plan.second])
+    ends = int(ids[plan.first]), int(ids[plan.end(number)])
     own = replace(
         own_problem(problem, crew, number),
         start_ids=ends[:1],
         end_id=ends[1],
         unscored_ids=tuple(sorted(set(ends))),
-        excluded_ids=tuple(sorted(int(ids[row]) for row in crew.closed(number))),
+        excluded_ids=tuple(sorted({int(ids[row]) for row in _others(crew, number)})),
     )
     before = crew.flights[number]
     result = polish(
@@ -365,6 +350,12 @@ def polished_probe(
     )
     flight = fly(own, Itinerary.from_tour(own, result.tour))
     return flight if flight is not None and _better(flight, before) else None
+
+
+def _others(crew: Crew, number: int) -> list[int]:
+    """Return rows that a probe leaves alone: other probes' visits, other orbits' asteroids."""
+    plan = crew.plan
+    return [*crew.closed(number), *set(plan.orbits) - {plan.first, plan.end(number)}]
 
 
 def fitted(problem: RendezvousProblem, itinerary: Itinerary) -> Flight | None:
@@ -386,13 +377,12 @@ def find_crew(
     screen: Screen,
     problem: RendezvousProblem,
     plan: Plan,
-    count: int,
     settings: HomingSettings,
 ) -> Crew:
-    """Return the tours of some probes, found one after another; fewer where there are no more."""
+    """Return the tours of all probes, found one after another; fewer where there are no more."""
     crew = Crew(plan, ())
-    for _ in range(count):
-        flight = find_probe(screen, problem, plan, crew.closed(), settings)
+    for number in range(len(plan.ends)):
+        flight = find_probe(screen, problem, crew, number, crew.closed(), settings)
         if flight is None:
             break
         crew = replace(crew, flights=(*crew.flights, flight))

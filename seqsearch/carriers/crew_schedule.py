@@ -23,8 +23,8 @@ def schedule_of(screen: Screen, crew: Crew) -> Schedule | None:
     """Return what the mother ship of a crew may do; None where she cannot fly as it is.
 
     Up to the release of the probe that stays at the first orbit's asteroid she is there, and at
-    the capture of the one that stays at the second's. Before each other release and capture there
-    is an impulse.
+    the capture of the one that stays at each other orbit's. Before each other release and capture
+    there is an impulse.
     """
     route = route_of(screen, crew)
     carrier = carrier_of(screen, crew)
@@ -42,23 +42,25 @@ def schedule_of(screen: Screen, crew: Crew) -> Schedule | None:
         stays = _stays(crew)
         begins, ends = _with_stays(crew, stays)
         releases = sorted(zip(begins, range(count), strict=True))
-        captures = sorted(zip(ends, range(count), strict=True))
-        steps = _steps(releases, captures, stays, impulses)
+        steps = _release_steps(releases, stays[0])
+        for orbit in range(1, len(crew.plan.orbits)):
+            captures = [(ends[k], k) for k in range(count) if crew.plan.ends[k] == orbit]
+            change = impulses[2 * orbit - 2 : 2 * orbit]
+            steps += _capture_steps(sorted(captures), stays[orbit], change)
     else:
         stays = crew.course.stays
         releases = sorted(zip(releases_of(crew), range(count), strict=True))
         captures = sorted(zip(captures_of(crew), range(count), strict=True))
         steps = _steps_again(crew, releases, captures, impulses)
     steps[0] = replace(steps[0], range_mjd2000=(route.second_mjd2000 + TOUCH_DAYS, np.inf))
-    if stays[1] is not None:
-        steps = _with_late_capture(
-            steps, crew, stays[1], route.launch_mjd2000 + rules.max_duration_days
-        )
+    for number in stays[1:]:
+        if number is not None:
+            end = route.launch_mjd2000 + rules.max_duration_days
+            steps = _with_late_capture(steps, crew, number, end)
     return Schedule(
         steps,
         screen.catalogue,
-        crew.plan.first,
-        crew.plan.second,
+        crew.plan.orbits,
         rules,
         route,
         stays,
@@ -67,7 +69,7 @@ def schedule_of(screen: Screen, crew: Crew) -> Schedule | None:
 
 
 _Epochs = list[tuple[float, int]]
-_Stays = tuple[int | None, int | None]
+_Stays = tuple[int | None, ...]
 
 
 def _stays(crew: Crew) -> _Stays:
@@ -76,53 +78,59 @@ def _stays(crew: Crew) -> _Stays:
     Then she is free to serve the others. As many stay as `Crew.waits` says.
     """
     wanted = crew.waits()
-    begins, ends = _with_stays(crew, (None, None))
-    best, earliest = wanted, (np.inf, np.inf)
-    for first, second in product(*[_others(crew, probe) for probe in wanted]):
-        stays = first, second
+    begins, ends = _with_stays(crew, (None,) * len(wanted))
+    best, earliest = wanted, (np.inf,) * len(wanted)
+    ways = [_others(crew, orbit, probe) for orbit, probe in enumerate(wanted)]
+    for stays in product(*ways):
         released, caught = _with_stays(crew, stays)
         if max(b - a for a, b in zip(released, caught, strict=True)) > MISSION_DAYS:
             continue
-        when = (
-            -np.inf if first is None else begins[first],
-            -np.inf if second is None else ends[second],
+        when = tuple(
+            -np.inf if probe is None else (ends if orbit else begins)[probe]
+            for orbit, probe in enumerate(stays)
         )
         if when < earliest:
             best, earliest = stays, when
     return best
 
 
-def _others(crew: Crew, probe: int | None) -> list[int | None]:
-    return [None] if probe is None else [*range(len(crew.flights))]
+def _others(crew: Crew, orbit: int, probe: int | None) -> list[int | None]:
+    if probe is None:
+        return [None]
+    return [k for k, end in enumerate(crew.plan.ends) if orbit in (0, end)]
 
 
 def _with_stays(crew: Crew, stays: _Stays) -> tuple[list[float], list[float]]:
     """Return the epochs of all releases and captures if some probes stay."""
     begins = [float(flight.itinerary.t_dep_mjd2000[0]) for flight in crew.flights]
     ends = [float(flight.itinerary.t_arr_mjd2000[-1]) for flight in crew.flights]
-    if stays[0] is not None:
-        begins[stays[0]] -= WAIT_DAYS
-    if stays[1] is not None:
-        ends[stays[1]] += WAIT_DAYS
+    for orbit, probe in enumerate(stays):
+        if probe is not None and orbit == 0:
+            begins[probe] -= WAIT_DAYS
+        elif probe is not None:
+            ends[probe] += WAIT_DAYS
     return begins, ends
 
 
-def _steps(
-    releases: _Epochs,
-    captures: _Epochs,
-    stays: _Stays,
-    change: list[CarrierImpulse],
-) -> list[Step]:
-    """Return the steps of a mother ship that changes her orbit once so far."""
-    leave, arrive = change
-    order = [number for _, number in captures]
-    before = 0 if stays[1] is None else order.index(stays[1])
+def _release_steps(releases: _Epochs, stay: int | None) -> list[Step]:
+    """Return the steps of a mother ship that releases all probes on her first orbit so far."""
     steps: list[Step] = []
-    kept = -1 if stays[0] is None else [number for _, number in releases].index(stays[0])
+    kept = -1 if stay is None else [number for _, number in releases].index(stay)
     for k, (epoch, number) in enumerate(releases):
         if k > kept:
             steps.append(Step(Act.IMPULSE, epoch - _FIRST_LEAD_DAYS))
         steps.append(Step(Act.RELEASE, epoch, number, free=k > kept, stays=k == kept))
+    return steps
+
+
+def _capture_steps(
+    captures: _Epochs, stay: int | None, change: list[CarrierImpulse]
+) -> list[Step]:
+    """Return the steps of a mother ship that goes on to an orbit and catches some probes there."""
+    leave, arrive = change
+    order = [number for _, number in captures]
+    before = 0 if stay is None else order.index(stay)
+    steps: list[Step] = []
     if before == 0:
         steps.append(Step(Act.DEPART, leave.t_mjd2000))
         steps.append(Step(Act.ARRIVE, arrive.t_mjd2000))
@@ -133,7 +141,7 @@ def _steps(
             earlier = captures[k - 1][0]
             steps.append(Step(Act.DEPART, earlier + 0.1 * (epoch - earlier)))
             steps.append(Step(Act.ARRIVE, earlier + 0.9 * (epoch - earlier)))
-        rests = number == stays[1]
+        rests = number == stay
         if k == 0 and before > 0:
             steps.append(Step(Act.IMPULSE, arrive.t_mjd2000, dv_m_s=arrive.dv_m_s))
         elif not rests:
@@ -155,12 +163,13 @@ def _steps_again(
     steps = []
     for epoch, act, number in events:
         away = act is Act.CAPTURE or course.starts[number] > 0
-        stays = number == course.stays[0 if act is Act.RELEASE else 1]
+        orbit = 0 if act is Act.RELEASE else crew.plan.ends[number]
+        stays = number == course.stays[orbit]
         steps.append(Step(act, epoch, number, free=away, stays=stays))
     for k, impulse in enumerate(impulses, 1):
-        if k == course.settled - 1:
+        if k + 1 in course.settled:
             steps.append(Step(Act.DEPART, impulse.t_mjd2000))
-        elif k == course.settled:
+        elif k in course.settled:
             steps.append(Step(Act.ARRIVE, impulse.t_mjd2000))
         else:
             steps.append(Step(Act.IMPULSE, impulse.t_mjd2000, dv_m_s=impulse.dv_m_s))

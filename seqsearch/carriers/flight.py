@@ -3,17 +3,17 @@
 from feasibility.errors import InputError
 from seqsearch.carriers.course import Course
 from seqsearch.carriers.crew import TOUCH_DAYS, WAIT_DAYS, Crew
-from seqsearch.carriers.mother import change_orbit, mother_flight
+from seqsearch.carriers.mother import Change, change_orbit, mother_flight
 from seqsearch.carriers.plans import Screen
 from seqsearch.carriers.routes import Route
 from seqsearch.tours.carrier.path import fly_carrier
-from seqsearch.tours.carrier.records import Carrier, CarrierImpulse
+from seqsearch.tours.carrier.records import Carrier
 
 
 def releases_of(crew: Crew) -> list[float]:
     """Return when each probe leaves the mother ship: one that stays there at first, earlier."""
     epochs = [float(flight.itinerary.t_dep_mjd2000[0]) for flight in crew.flights]
-    first, _ = crew.waits()
+    first = crew.waits()[0]
     if first is not None:
         early = epochs[first] - WAIT_DAYS
         epochs[first] = early if crew.course is None else crew.course.stay_epochs[0]
@@ -21,12 +21,12 @@ def releases_of(crew: Crew) -> list[float]:
 
 
 def captures_of(crew: Crew) -> list[float]:
-    """Return when each probe is caught: one that stays there at last, later."""
+    """Return when each probe is caught: those that stay there at last, later."""
     epochs = [float(flight.itinerary.t_arr_mjd2000[-1]) for flight in crew.flights]
-    _, second = crew.waits()
-    if second is not None:
-        late = epochs[second] + WAIT_DAYS
-        epochs[second] = late if crew.course is None else crew.course.stay_epochs[1]
+    for orbit, probe in enumerate(crew.waits()):
+        if orbit > 0 and probe is not None:
+            late = epochs[probe] + WAIT_DAYS
+            epochs[probe] = late if crew.course is None else crew.course.stay_epochs[orbit]
     return epochs
 
 
@@ -43,19 +43,17 @@ def carrier_of(screen: Screen, crew: Crew) -> Carrier | None:
     if route is None:
         return None
     releases, captures = releases_of(crew), captures_of(crew)
-    last, first = max(releases), min(captures)
-    if min(releases) < route.second_mjd2000 or first <= last:
+    if min(releases) < route.second_mjd2000:
         return None
-    impulses: tuple[CarrierImpulse, ...] = ()
-    if crew.course is not None:
+    if crew.course is None:
+        changes = _changes(screen, crew, releases, captures)
+        if changes is None:
+            return None
+        impulses = tuple(impulse for change in changes for impulse in change.impulses)
+    else:
         if not _serves(crew.course, releases, captures):
             return None
         impulses = crew.course.impulses
-    elif crew.plan.first != crew.plan.second:
-        between = last + TOUCH_DAYS, first - TOUCH_DAYS
-        impulses = change_orbit(
-            screen.catalogue, crew.plan.first, crew.plan.second, between
-        ).impulses
     masses = [float(flight.mass[-1]) for flight in crew.flights]
     try:
         carrier = mother_flight(
@@ -67,6 +65,22 @@ def carrier_of(screen: Screen, crew: Crew) -> Carrier | None:
     long = max(captures) - route.launch_mjd2000 > screen.rules.max_duration_days
     many = len(carrier.impulses) > screen.rules.max_impulses
     return None if long or many or path.propellant_left_kg < 0.0 else carrier
+
+
+def _changes(
+    screen: Screen, crew: Crew, releases: list[float], captures: list[float]
+) -> list[Change] | None:
+    """Return the cheapest changes from each orbit to the next; None where there is no time."""
+    plan, changes = crew.plan, []
+    caught = list(zip(plan.ends, captures, strict=True))
+    for orbit in range(1, len(plan.orbits)):
+        begin = max(*releases, *[epoch for end, epoch in caught if end < orbit]) + TOUCH_DAYS
+        end = min(epoch for end, epoch in caught if end >= orbit) - TOUCH_DAYS
+        if end <= begin:
+            return None
+        one, other = plan.orbits[orbit - 1 : orbit + 1]
+        changes.append(change_orbit(screen.catalogue, one, other, (begin, end)))
+    return changes
 
 
 def _serves(course: Course, releases: list[float], captures: list[float]) -> bool:

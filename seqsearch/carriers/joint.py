@@ -96,7 +96,7 @@ def joined_crew(
     problem : RendezvousProblem
         One probe.
     crew : Crew
-        With two orbits; one on a course goes on from there.
+        With several orbits; one on a course goes on from there.
     rng : Generator
         Draws what is asked for: which probe matters most, what propellant is worth, where the
         optimiser begins.
@@ -127,7 +127,7 @@ def joined(
     stirred : float
         How far the optimiser begins from what there is, in its own units.
     """
-    if crew.plan.first == crew.plan.second or screen.catalogue.ephemeris is not None:
+    if len(crew.plan.orbits) == 1 or screen.catalogue.ephemeris is not None:
         return None
     best, value = crew, _value(crew, wishes)
     for turn in range(_ROUNDS):

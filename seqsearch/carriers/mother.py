@@ -37,8 +37,13 @@ _SHORTEST: Final = 0.15
 """Departures and arrivals that are tried, and the shortest flight, as shares of the time."""
 
 _EVALUATIONS: Final = 300
+_SPEED: Final = 15_000.0
+"""m/s, the least on orbits of the belt. An impulse turns the plane by at most dv / v, and changes
+the vector of the eccentricity and a (as a share) by 2 dv / v: Gauss's equations."""
+
+_ALLOWANCE: Final = 1.2
 _NEAR: Final = (0.08, 0.12, 0.07)
-"""How far a (as a share), e and i of orbits that she may go on to are from her first one's."""
+"""By how much these limits are exceeded, and the most of a, e and the plane."""
 
 
 @final
@@ -102,10 +107,14 @@ def next_orbits(
     delta_v_max : float, m/s
         Largest cost.
     """
-    a, e, i = catalogue.elements[:, :3].T
-    near = np.abs(a / a[first] - 1.0) < _NEAR[0]
-    near &= (np.abs(e - e[first]) < _NEAR[1]) & (np.abs(i - i[first]) < _NEAR[2])
-    near[first] = False
+    a, e, i, node, argp = catalogue.elements[:, :5].T
+    plane = np.column_stack([np.sin(i) * np.sin(node), -np.sin(i) * np.cos(node), np.cos(i)])
+    along = e * np.cos(node + argp), e * np.sin(node + argp)
+    turn = _ALLOWANCE * delta_v_max / _SPEED
+    limits = np.minimum(_NEAR, (2.0 * turn, 2.0 * turn, turn))
+    near = np.abs(a / a[first] - 1.0) < limits[0]
+    near &= np.hypot(*(part - part[first] for part in along)) < limits[1]
+    near &= plane @ plane[first] > np.cos(limits[2])
     rows = np.flatnonzero(near)
     costs = change_costs(catalogue, first, rows, between_mjd2000)
     cheap = np.flatnonzero(costs <= delta_v_max)

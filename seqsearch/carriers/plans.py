@@ -1,8 +1,8 @@
-"""`Plan`: which two orbits a mother ship uses and when; and how plans are screened.
+"""`Plan`: which orbits a mother ship uses and when; and how plans are screened.
 
 All asteroids whose orbits she can get to are looked at: `Screen.candidates` are plans that keep to
 one of them, `Screen.continued` those that go on to a second one, `Screen.valued` runs beams for
-all probes of a plan.
+all probes of a plan. Plans with a third orbit are in `chains`.
 """
 
 from collections.abc import Sequence
@@ -17,7 +17,7 @@ from feasibility.classifier.predictor import LegPredictor
 from feasibility.constants import AU
 from feasibility.orbits import Catalogue
 from seqsearch.carriers.chart_files import read_chart
-from seqsearch.carriers.homing import Homecoming, Homing, HomingSettings
+from seqsearch.carriers.homing import DAYS_PER_VISIT, Homecoming, Homing, HomingSettings
 from seqsearch.carriers.leg_chart import STEP_DAYS, ChartMaker, ChartPart, LegChart
 from seqsearch.carriers.mother import later_budget, next_orbits
 from seqsearch.carriers.routes import Route, Routes, refined_route, scan_routes
@@ -61,31 +61,78 @@ _WAIT_DAYS: Final = STAY_DAYS + 1.0
 @final
 @dataclass(frozen=True)
 class Plan:
-    """Two orbits, when the probes are released, and what that promises.
+    """The orbits of a mother ship, when the probes are released, and what that promises.
+
+    With n probes.
 
     Attributes
     ----------
-    first, second : int
-        Catalogue rows of the asteroids whose orbits they are; they may be equal.
-    window_mjd2000 : float
-        Earliest departure of a probe to its first asteroid; the latest is `SPREAD_DAYS` later.
+    orbits : tuple of int
+        Catalogue rows of the asteroids whose orbits she is on, one after the other, all different.
+        All probes are released on the first one.
+    ends : tuple of int
+        (n,) The orbit on which each probe is caught, as a position in `orbits`.
+    windows_mjd2000 : tuple of tuple of float
+        (n, 2) Earliest and latest departure of each probe to its first asteroid.
     value : float
-        Predicted visits of a probe, and the share of a visit for which time is left.
+        Predicted visits of a probe, the asteroids of the orbits included, and the share of a visit
+        for which time is left.
     """
 
-    first: int
-    second: int
-    window_mjd2000: float
-    value: float
+    orbits: tuple[int, ...]
+    ends: tuple[int, ...]
+    windows_mjd2000: tuple[tuple[float, float], ...]
+    value: float = 0.0
 
-    def epochs(self, offset_days: float = 0.0) -> _Array:
-        """Return the departures that are tried, the first some days after the beginning."""
-        end = self.window_mjd2000 + SPREAD_DAYS
-        return np.arange(self.window_mjd2000 + offset_days, end, RELEASES_DAYS)
+    @classmethod
+    def together(cls, orbits: tuple[int, ...], window_mjd2000: float, count: int) -> "Plan":
+        """Return a plan whose probes are all caught on the last orbit.
+
+        Parameters
+        ----------
+        orbits : tuple of int
+            Catalogue rows.
+        window_mjd2000 : float
+            Earliest departure of all probes; the latest is `SPREAD_DAYS` later.
+        count : int
+            How many probes.
+        """
+        window = (window_mjd2000, window_mjd2000 + SPREAD_DAYS)
+        return cls(orbits, (len(orbits) - 1,) * count, (window,) * count)
+
+    @property
+    def first(self) -> int:
+        """Row of the orbit on which all probes are released."""
+        return self.orbits[0]
+
+    @property
+    def begin_mjd2000(self) -> float:
+        """Earliest departure of a probe."""
+        return min(begin for begin, _ in self.windows_mjd2000)
+
+    @property
+    def last_mjd2000(self) -> float:
+        """Latest departure of a probe."""
+        return max(end for _, end in self.windows_mjd2000)
+
+    def end(self, number: int) -> int:
+        """Return the row of the orbit on which a probe is caught."""
+        return self.orbits[self.ends[number]]
+
+    def epochs(self, number: int, offset_days: float = 0.0) -> _Array:
+        """Return departures of a probe to try, the first some days after the beginning."""
+        begin, end = self.windows_mjd2000[number]
+        return np.arange(min(begin + offset_days, end - 1.0), end, RELEASES_DAYS)
+
+    def with_window(self, number: int, window_mjd2000: tuple[float, float]) -> "Plan":
+        """Return the plan with another window of departures of one probe."""
+        windows = list(self.windows_mjd2000)
+        windows[number] = window_mjd2000
+        return replace(self, windows_mjd2000=tuple(windows))
 
     def same(self, other: "Plan") -> bool:
         """Tell whether another plan has the same orbits."""
-        return (self.first, self.second) == (other.first, other.second)
+        return self.orbits == other.orbits
 
 
 @final
@@ -122,7 +169,7 @@ class Screen:
         self.predictor = predictor
         self.chart_folder = chart_folder
         self.launch_mjd2000 = launch_mjd2000 or rules.launch_mjd2000
-        self._routes: dict[tuple[int, float], Route | None] = {}
+        self._routes: dict[tuple[int, float, float], Route | None] = {}
         self._homing: Homing | None = None
         self._reserve = settings.margin_reserve
         self.duration_days = problem.max_duration_days
@@ -190,7 +237,7 @@ class Screen:
         bodies, begins = np.unique(routes.row[order], return_index=True)
         parts = np.split(order, begins[1:])
         return [
-            Plan(int(row), int(row), float(window), 0.0)
+            Plan.together((int(row),), float(window), self.rules.craft_count)
             for row, part in zip(bodies, parts, strict=True)
             for window in self.windows(routes.take(part), offset)
         ]
@@ -229,50 +276,61 @@ class Screen:
         rows, _ = next_orbits(
             self.catalogue,
             plan.first,
-            (plan.window_mjd2000 + SPREAD_DAYS, plan.window_mjd2000 + self.duration_days),
+            (plan.last_mjd2000, plan.begin_mjd2000 + self.duration_days),
             later_budget(self.rules, route.delta_v),
         )
-        return [replace(plan, second=int(row), value=0.0) for row in rows[:_MOST_SECONDS]]
+        return [
+            Plan.together((plan.first, int(row)), plan.begin_mjd2000, self.rules.craft_count)
+            for row in rows[:_MOST_SECONDS]
+        ]
 
     def valued(self, plan: Plan, settings: HomingSettings, probes: int) -> Plan:
-        """Return a plan with its value: the mean of its best predicted tours; 0 for too few.
+        """Return a plan with its value; 0 where there are too few tours.
 
-        Each probe leaves its asteroids to none that follow.
+        It is the mean of the best predicted tours of the first probes, each of which leaves its
+        asteroids to none that follow; and the asteroids at which the mother ship is at rest, less
+        the stays there.
         """
         avoid: list[int] = []
         total = 0.0
-        for _ in range(probes):
-            tours = self.tours(plan, settings, avoid)
+        for number in range(probes):
+            tours = self.tours(plan, number, settings, avoid)
             if not tours:
                 return replace(plan, value=0.0)
             best = max(tours, key=lambda tour: tour.value(self.duration_days))
             total += best.value(self.duration_days)
             avoid += best.itinerary.rows[1:-1].tolist()
-        return replace(plan, value=total / probes)
+        return replace(plan, value=total / probes + self.at_rest(plan))
+
+    def at_rest(self, plan: Plan) -> float:
+        """Return what the asteroids of all orbits are worth, in visits of a probe."""
+        each = 1.0 - _WAIT_DAYS / DAYS_PER_VISIT
+        return each * len(plan.orbits) / self.rules.craft_count
 
     def tours(
         self,
         plan: Plan,
+        number: int,
         settings: HomingSettings,
         avoid: Sequence[int] = (),
         offset_days: float = 0.0,
     ) -> list[Homecoming]:
         """Return predicted tours of one probe, best first."""
-        epochs = plan.epochs(offset_days)
+        epochs = plan.epochs(number, offset_days)
         starts = Nodes.at_start(
             np.full(len(epochs), plan.first), epochs, np.full(len(epochs), self._m0)
         )
-        closed = np.unique([plan.first, plan.second, *avoid])
-        return self.homing.run(starts, plan.second, closed, settings)
+        closed = np.unique([*plan.orbits, *avoid])
+        return self.homing.run(starts, plan.end(number), closed, settings)
 
     def route(self, plan: Plan) -> Route | None:
         """Return the cheapest way to the first orbit that is in time; None for none."""
-        key = plan.first, plan.window_mjd2000
+        key = plan.first, plan.begin_mjd2000, plan.last_mjd2000
         if key not in self._routes:
             self._routes[key] = self.cheapest_route(
                 plan.first,
-                plan.window_mjd2000 - self._latest_days(),
-                plan.window_mjd2000 - _WAIT_DAYS,
+                plan.last_mjd2000 + self.duration_days - self.rules.max_duration_days,
+                plan.begin_mjd2000 - _WAIT_DAYS,
             )
         return self._routes[key]
 

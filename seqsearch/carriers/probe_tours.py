@@ -10,7 +10,6 @@ from feasibility.constants import AU, MJD2000_MJD
 from feasibility.orbits import Catalogue
 from seqsearch.carriers.crew import TOUCH_DAYS, WAIT_DAYS, Crew
 from seqsearch.carriers.flight import captures_of, releases_of
-from seqsearch.carriers.plans import SPREAD_DAYS
 from seqsearch.polish.flight import fly
 from seqsearch.polish.itinerary import Itinerary
 from seqsearch.problems.extra_bodies import BodyTable
@@ -39,29 +38,22 @@ def probe_config(config: Config, catalogue: Catalogue, crew: Crew, number: int) 
         Which of them, from 0.
     """
     plan = crew.plan
-    waits = crew.waits()
     others = [int(catalogue.ids[row]) for row in crew.closed(number)]
     others += [
         int(catalogue.ids[row])
-        for row, probe in zip((plan.first, plan.second), waits, strict=True)
+        for row, probe in zip(plan.orbits, crew.waits(), strict=True)
         if probe not in (None, number)
     ]
     released = releases_of(crew)[number]
-    window = (
-        min(plan.window_mjd2000 - WAIT_DAYS, released) - 1.0,
-        max(plan.window_mjd2000 + SPREAD_DAYS, released) + 1.0,
-    )
+    begin, end = plan.windows_mjd2000[number]
+    window = min(begin - WAIT_DAYS, released) - 1.0, max(end, released) + 1.0
     course = crew.course
-    orbits = (
-        catalogue
-        if course is None
-        else course.catalogue_for(catalogue, plan.first, plan.second, number)
-    )
+    orbits = catalogue if course is None else course.catalogue_for(catalogue, plan, number)
     return msgspec.structs.replace(
         config,
         bodies=(
             _orbit(orbits, plan.first, RELEASE_ID, "mother ship at the release"),
-            _orbit(orbits, plan.second, CAPTURE_ID, "mother ship at the capture"),
+            _orbit(orbits, plan.end(number), CAPTURE_ID, "mother ship at the capture"),
         ),
         mission=msgspec.structs.replace(
             config.mission,
@@ -95,13 +87,13 @@ def probe_tour(config: Config, catalogue: Catalogue, crew: Crew, number: int) ->
     itinerary = crew.flights[number].itinerary
     ids = catalogue.ids[itinerary.rows].tolist()
     t_dep, tof = list(itinerary.t_dep_mjd2000), list(itinerary.tof_days)
-    first, second = crew.waits()
-    if first == number:
+    waits, end = crew.waits(), crew.plan.ends[number]
+    if waits[0] == number:
         released = releases_of(crew)[number]
         ids, t_dep, tof = [RELEASE_ID, *ids], [released, *t_dep], [TOUCH_DAYS, *tof]
     else:
         ids[0] = RELEASE_ID
-    if second == number:
+    if end > 0 and waits[end] == number:
         away = captures_of(crew)[number] - TOUCH_DAYS
         ids, t_dep, tof = [*ids, CAPTURE_ID], [*t_dep, away], [*tof, TOUCH_DAYS]
     else:

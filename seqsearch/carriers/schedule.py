@@ -35,7 +35,7 @@ _ROUNDING: Final = 0.3
 
 
 class Act(Enum):
-    """What happens. The way to the second orbit is from DEPART to ARRIVE, by a Lambert arc."""
+    """What happens. The way to the next orbit is from DEPART to ARRIVE, by a Lambert arc."""
 
     IMPULSE = auto()
     DEPART = auto()
@@ -106,15 +106,17 @@ class Schedule:
     Parameters
     ----------
     steps : sequence of Step
-        In order; one `DEPART`, and an `ARRIVE` right after it.
-    catalogue, first, second
-        The asteroids, and the rows of those of both orbits.
+        In order; one `DEPART` for each orbit after the first, and an `ARRIVE` right after it.
+    catalogue : Catalogue
+        The asteroids.
+    orbits : tuple of int
+        Rows of those of her orbits.
     rules : CarrierRules
         The mother ship.
     route : Route
         To the first orbit.
     stays : tuple
-        The probes that stay at the asteroids of both orbits; None for none.
+        The probes that stay at the asteroids of the orbits; None for none.
     caught_kg : sequence of float
         Mass of each probe when it comes back.
     """
@@ -123,15 +125,14 @@ class Schedule:
         self,
         steps: Sequence[Step],
         catalogue: Catalogue,
-        first: int,
-        second: int,
+        orbits: tuple[int, ...],
         rules: CarrierRules,
         route: Route,
-        stays: tuple[int | None, int | None],
+        stays: tuple[int | None, ...],
         caught_kg: Sequence[float],
     ) -> None:
         self.steps = tuple(steps)
-        self._catalogue, self._first, self._second = catalogue, first, second
+        self._catalogue, self._orbits = catalogue, orbits
         self._rules = rules
         self._route = route
         self._mass_kg = mass_after(rules, rules.m0_kg, route.delta_v)
@@ -167,19 +168,21 @@ class Schedule:
         return [*epochs, *[(-largest, largest)] * (3 * len(self._aimed))]
 
     def fly(self, x: _Array) -> Outing:
-        """Fly (m, k) variants; NaN where there is no way to the second orbit."""
+        """Fly (m, k) variants; NaN where there is no way to the next orbit."""
         m, n = len(x), len(self.steps)
         t = self.epochs(x)
         states, dv = np.empty((m, n, 6)), np.zeros((m, n, 3))
         impulses = IMPULSE_SCALE * x[:, len(self._timed) :].reshape(m, -1, 3)
         dv[:, self._aimed] = impulses
-        before = self._catalogue.states_at(np.full(m, self._first), t[:, 0])
+        before = self._catalogue.states_at(np.full(m, self._orbits[0]), t[:, 0])
+        reached = 0
         for k, step in enumerate(self.steps):
             if k > 0:
                 before = coasted(states[:, k - 1], t[:, k] - t[:, k - 1], MU_SUN)
             after = before.copy()
             if step.act is Act.DEPART:
-                goal = self._catalogue.states_at(np.full(m, self._second), t[:, k + 1])
+                reached += 1
+                goal = self._catalogue.states_at(np.full(m, self._orbits[reached]), t[:, k + 1])
                 dv[:, k], dv[:, k + 1] = _arc(before, goal, t[:, k + 1] - t[:, k])
             if step.act is Act.ARRIVE:
                 after = goal
@@ -206,9 +209,9 @@ class Schedule:
         """Return the course of one variant, (k,)."""
         outing = self.fly(x[None])
         impulses: list[CarrierImpulse] = []
-        settled = 0
+        settled: list[int] = []
         starts, ends = dict[int, int](), dict[int, int]()
-        stay_epochs = {Act.RELEASE: 0.0, Act.CAPTURE: 0.0}
+        stay_epochs = [0.0] * len(self._orbits)
         for k, step in enumerate(self.steps):
             if step.act is Act.RELEASE:
                 starts[step.probe] = len(impulses)
@@ -219,17 +222,18 @@ class Schedule:
                 epoch = float(outing.t[0, k])
                 impulses.append(CarrierImpulse(t_mjd2000=epoch, dv_m_s=(one, two, three)))
             if step.act is Act.ARRIVE:
-                settled = len(impulses)
+                settled.append(len(impulses))
             if step.stays:
-                stay_epochs[step.act] = float(outing.t[0, k])
+                orbit = len(settled) if step.act is Act.CAPTURE else 0
+                stay_epochs[orbit] = float(outing.t[0, k])
         return Course(
             impulses=tuple(impulses),
-            settled=settled,
+            settled=tuple(settled),
             starts=tuple(starts[number] for number in sorted(starts)),
             ends=tuple(ends[number] for number in sorted(ends)),
             stays=self._stays,
             route=self._route,
-            stay_epochs=(stay_epochs[Act.RELEASE], stay_epochs[Act.CAPTURE]),
+            stay_epochs=tuple(stay_epochs),
         )
 
 

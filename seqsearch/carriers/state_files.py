@@ -19,10 +19,10 @@ from seqsearch.polish.itinerary import Itinerary
 from seqsearch.problems.rendezvous import RendezvousProblem
 from seqsearch.tours.carrier.records import CarrierImpulse
 
-_FORMAT: Final = "seqsearch-campaign-2"
+_FORMAT: Final = "seqsearch-campaign-3"
 
-_PlanRow = tuple[int, int, float, float]
-"""Ids of both orbits' bodies, window, value."""
+_PlanRow = tuple[tuple[int, ...], tuple[int, ...], tuple[tuple[float, float], ...], float]
+"""Ids of the orbits' bodies, the probes' ends and windows, value."""
 
 
 class _Record(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -39,11 +39,11 @@ class _ProbeRecord(_Record, frozen=True, kw_only=True):
 @final
 class _CourseRecord(_Record, frozen=True, kw_only=True):
     impulses: tuple[CarrierImpulse, ...]
-    settled: int
+    settled: tuple[int, ...]
     starts: tuple[int, ...]
     ends: tuple[int, ...]
-    stays: tuple[int | None, int | None]
-    stay_epochs: tuple[float, float]
+    stays: tuple[int | None, ...]
+    stay_epochs: tuple[float, ...]
     route: Route | None
 
 
@@ -68,6 +68,7 @@ class _StateRecord(_Record, frozen=True, kw_only=True):
     rated: tuple[_PlanRow, ...]
     sifted: tuple[_PlanRow, ...]
     continued: tuple[_PlanRow, ...]
+    chained: tuple[_PlanRow, ...]
     judged: tuple[_PlanRow, ...]
     crews: tuple[_CrewRecord, ...]
 
@@ -83,7 +84,8 @@ def write_state(path: Path, state: CampaignState, problem: RendezvousProblem) ->
     ids = problem.catalogue.ids
 
     def plan_row(plan: Plan) -> _PlanRow:
-        return int(ids[plan.first]), int(ids[plan.second]), plan.window_mjd2000, plan.value
+        orbits = tuple(ids[np.array(plan.orbits)].tolist())
+        return orbits, plan.ends, plan.windows_mjd2000, plan.value
 
     record = _StateRecord(
         format=_FORMAT,
@@ -98,6 +100,7 @@ def write_state(path: Path, state: CampaignState, problem: RendezvousProblem) ->
         rated=tuple(map(plan_row, state.rated)),
         sifted=tuple(map(plan_row, state.sifted)),
         continued=tuple(map(plan_row, state.continued)),
+        chained=tuple(map(plan_row, state.chained)),
         judged=tuple(map(plan_row, state.judged)),
         crews=tuple(
             _CrewRecord(
@@ -146,12 +149,16 @@ def read_state(path: Path, problem: RendezvousProblem) -> CampaignState:
         raise InputError(f"{path}: format {record.format!r}, expected {_FORMAT!r}")
 
     def plan_of(row: _PlanRow) -> Plan:
-        first, second = problem.catalogue.rows_of(np.array(row[:2]))
-        return Plan(int(first), int(second), row[2], row[3])
+        orbits, ends, windows, value = row
+        if not (orbits and len(ends) == len(windows) and set(ends) <= set(range(len(orbits)))):
+            raise InputError(f"{path}: a plan whose orbits, ends and windows do not fit")
+        rows = problem.catalogue.rows_of(np.array(orbits))
+        return Plan(tuple(rows.tolist()), ends, windows, value)
 
     def crew_of(crew: _CrewRecord) -> Crew:
         flights = []
-        known = Crew(plan_of(crew.plan), (), _course_of(path, crew))
+        plan = plan_of(crew.plan)
+        known = Crew(plan, (), _course_of(path, crew, plan))
         for number, probe in enumerate(crew.probes):
             rows = problem.catalogue.rows_of(np.array(probe.ids)).astype(np.intp)
             flight = fly(
@@ -175,19 +182,22 @@ def read_state(path: Path, problem: RendezvousProblem) -> CampaignState:
         rated=[plan_of(row) for row in record.rated],
         sifted=[plan_of(row) for row in record.sifted],
         continued=[plan_of(row) for row in record.continued],
+        chained=[plan_of(row) for row in record.chained],
         judged=[plan_of(row) for row in record.judged],
         crews=[crew_of(crew) for crew in record.crews],
     )
 
 
-def _course_of(path: Path, crew: _CrewRecord) -> Course | None:
+def _course_of(path: Path, crew: _CrewRecord, plan: Plan) -> Course | None:
     course = crew.course
     if course is None:
         return None
-    coasts = {*course.starts, *course.ends, course.settled}
+    coasts = {*course.starts, *course.ends, *course.settled}
     stays = {number for number in course.stays if number is not None}
     known = min(coasts) >= 0 and max(coasts) <= len(course.impulses)
     known &= len(course.starts) == len(course.ends) == len(crew.probes)
+    orbits = len(plan.orbits)
+    known &= len(course.settled) + 1 == len(course.stays) == len(course.stay_epochs) == orbits
     if not (known and stays <= set(range(len(crew.probes)))):
         raise InputError(f"{path}: a course that does not fit its probes and impulses")
     return Course(

@@ -241,6 +241,7 @@ TINY_CAMPAIGN = CampaignSettings(
     rated=4000,
     sifted=200,
     continued=1,
+    chained=1,
     judged=2,
     manned=2,
     improvements=4,

@@ -56,7 +56,7 @@ def test_asteroids_are_counted_once(run):
 def test_a_run_without_a_limit_is_complete_and_a_damaged_state_is_an_error(run):
     state = json.loads((run / STATE).read_text())
     assert state["looked"][1] == min(200, len(state["rated"])) > 2
-    assert state["looked"][3] == 2
+    assert state["looked"][4] == 2
     assert (state["manned"], state["tried"]) == (2, 4)
     (run / STATE).rename(run / "kept")
     (run / STATE).write_text("{}")

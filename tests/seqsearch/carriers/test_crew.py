@@ -8,20 +8,21 @@ from seqsearch.carriers.crew import WAIT_DAYS, Crew
 from seqsearch.carriers.plans import Plan
 
 
-def crew_of(*durations, second=2):
+def crew_of(*durations, orbits=(1, 2), ends=None):
+    ends = ends or (len(orbits) - 1,) * len(durations)
     flights = tuple(
         SimpleNamespace(
             itinerary=SimpleNamespace(
-                rows=np.array([1, 10 * k, 10 * k + 1, second]), duration_days=days
+                rows=np.array([1, 10 * k, 10 * k + 1, orbits[end]]), duration_days=days
             )
         )
-        for k, days in enumerate(durations, 1)
+        for k, (days, end) in enumerate(zip(durations, ends, strict=True), 1)
     )
     flights = tuple(
         SimpleNamespace(itinerary=_Sized(flight.itinerary), mass=np.array([801.0]))
         for flight in flights
     )
-    return Crew(Plan(1, second, 9000.0, 0.0), flights)
+    return Crew(Plan(orbits, ends, ((9000.0, 9900.0),) * len(durations)), flights)
 
 
 class _Sized:
@@ -45,9 +46,21 @@ def test_both_asteroids_count_where_there_is_time_for_both():
 
 
 def test_one_orbit_has_one_asteroid_that_counts_once():
-    crew = crew_of(2100.0, 2000.0, 2191.0, second=1)
+    crew = crew_of(2100.0, 2000.0, 2191.0, orbits=(1,))
     assert crew.visits() == 3 * 2 + 1
-    assert crew.waits()[1] is None
+    assert len(crew.waits()) == 1
+
+
+def test_three_orbits_have_three_asteroids_for_probes_that_end_there():
+    crew = crew_of(2150.0, 2100.0, 2150.0, orbits=(1, 2, 3), ends=(1, 2, 2))
+    first, second, third = crew.waits()
+    assert second == 0
+    assert {first, third} <= {1, 2}
+    assert crew.visits() == 3 * 2 + 3
+    # Only the first probe ends on the second orbit, and it has no time.
+    late = crew_of(2191.0, 2100.0, 2100.0, orbits=(1, 2, 3), ends=(1, 2, 2))
+    assert late.waits()[1] is None
+    assert late.visits() == 3 * 2 + 2
 
 
 def test_closed_bodies_are_those_of_the_other_probes():

@@ -72,13 +72,13 @@ def leg_times(problem, screen, row, goals, t, mass):
     return np.where(found, tof[best], np.inf), left[np.arange(len(goals)), best]
 
 
-def tour(problem, screen, plan, t, closed):
+def tour(problem, screen, plan, number, t, closed):
     """Return the flight of a probe that goes to the nearest body again and again, then home."""
     rows, departures, flights, mass = [plan.first], [], [], problem.m0
     for _ in range(VISITS):
         points = orbital_metric(problem.catalogue.states(t + 150.0), 180.0)
         order = np.argsort(np.linalg.norm(points - points[rows[-1]], axis=1))
-        near = np.setdiff1d(order[:60], [*rows, *closed, plan.first, plan.second])
+        near = np.setdiff1d(order[:60], [*rows, *closed, *plan.orbits])
         days, left = leg_times(problem, screen, rows[-1], near, t, mass)
         best = int(np.argmin(days))
         if not np.isfinite(days[best]):
@@ -87,12 +87,12 @@ def tour(problem, screen, plan, t, closed):
         departures.append(t)
         flights.append(float(days[best]))
         mass, t = float(left[best]), t + float(days[best]) + 30.0
-    days, _ = leg_times(problem, screen, rows[-1], np.array([plan.second]), t, mass)
+    days, _ = leg_times(problem, screen, rows[-1], np.array([plan.end(number)]), t, mass)
     if not np.isfinite(days[0]):
         return None
     timetable = np.array([*departures, t]), np.array([*flights, float(days[0])])
-    own = own_problem(problem, Crew(plan, ()), 0)
-    flight = fitted(own, Itinerary(np.array([*rows, plan.second]), *timetable))
+    own = own_problem(problem, Crew(plan, ()), number)
+    flight = fitted(own, Itinerary(np.array([*rows, plan.end(number)]), *timetable))
     for _ in range(5):
         flight = None if flight is None else fitted(own, flight.itinerary)
     return flight
@@ -108,18 +108,18 @@ def crew(problem, screen):
     order = np.argsort(routes.delta_v, kind="stable")
     for k in order[:10]:
         first, window = int(routes.row[k]), float(routes.launch_mjd2000[k] + 900.0)
-        route = screen.route(Plan(first, first, window, 0.0))
+        route = screen.route(Plan.together((first,), window, 3))
         if route is None:
             continue
         between = window + 250.0, window + 1200.0
         most = 0.9 * later_budget(screen.rules, route.delta_v)
         seconds, _ = next_orbits(catalogue, first, between, most)
         for second in seconds[:3]:
-            plan = Plan(first, int(second), window, 0.0)
+            plan = Plan.together((first, int(second)), window, 3)
             flights = []
-            for late in (40.0, 120.0, 240.0):
+            for number, late in enumerate((40.0, 120.0, 240.0)):
                 closed = [row for flight in flights for row in flight.itinerary.rows]
-                flight = tour(problem, screen, plan, window + late, closed)
+                flight = tour(problem, screen, plan, number, window + late, closed)
                 if flight is None:
                     break
                 flights.append(flight)
@@ -163,7 +163,7 @@ def test_probes_leave_where_she_is_and_end_where_she_is(problem, screen, polishe
     for number in range(3):
         bodies = own_problem(problem, polished, number).catalogue
         release, capture = path.carrier.release(number + 1), path.carrier.capture(number + 1)
-        for epoch, row in ((release.t_mjd2000, plan.first), (capture.t_mjd2000, plan.second)):
+        for epoch, row in ((release.t_mjd2000, plan.first), (capture.t_mjd2000, plan.end(number))):
             # Her impulses are never at the same epoch.
             miss = path.states(epoch)[0] - bodies.states_at([row], epoch)[0]
             assert np.linalg.norm(miss[:3]) < 1e5  # m, of a tolerance of 1000 km
@@ -178,7 +178,7 @@ def test_every_tour_keeps_the_rules_from_its_own_orbit_to_its_own(problem, polis
 def test_those_that_stay_are_released_first_and_caught_at_rest(screen, polished):
     course, releases, captures = polished.course, releases_of(polished), captures_of(polished)
     first, second = course.stays
-    assert (course.starts[first], course.ends[second]) == (0, course.settled)
+    assert (course.starts[first], course.ends[second]) == (0, course.settled[0])
     assert releases[first] == min(releases)
     itinerary = polished.flights[second].itinerary
     assert captures[second] >= itinerary.t_arr_mjd2000[-1] + WAIT_DAYS - 1e-6
@@ -196,7 +196,9 @@ def test_she_stays_for_a_day_after_one_that_is_caught_at_rest(polished):
 def test_a_release_before_the_window_of_the_plan_is_one_of_the_course(problem, polished):
     """She may be on a coast, and off it, before the plan's window begins."""
     end = max(impulse.t_mjd2000 for impulse in polished.course.impulses)
-    late = replace(polished, plan=replace(polished.plan, window_mjd2000=end + 500.0))
+    late = replace(
+        polished, plan=replace(polished.plan, windows_mjd2000=((end + 500.0, end + 900.0),) * 3)
+    )
     for number, flight in enumerate(late.flights):
         begin, last = own_problem(problem, late, number).first_departure_mjd2000
         assert begin <= flight.itinerary.t_dep_mjd2000[0] <= last
@@ -213,7 +215,7 @@ def test_a_schedule_is_in_order_and_begins_with_what_there_is(screen, crew):
 
 
 def test_a_crew_of_one_orbit_is_left_alone(problem, screen, crew):
-    plan = replace(crew.plan, second=crew.plan.first)
+    plan = Plan.together(crew.plan.orbits[:1], crew.plan.begin_mjd2000, 3)
     one = replace(crew, plan=plan)
     assert joined(screen, problem, one, WISHES, rng=np.random.default_rng(1)) is None
 
