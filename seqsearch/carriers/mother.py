@@ -115,6 +115,7 @@ def next_orbits(
     near = np.abs(a / a[first] - 1.0) < limits[0]
     near &= np.hypot(*(part - part[first] for part in along)) < limits[1]
     near &= plane @ plane[first] > np.cos(limits[2])
+    near[first] = False
     rows = np.flatnonzero(near)
     costs = change_costs(catalogue, first, rows, between_mjd2000)
     cheap = np.flatnonzero(costs <= delta_v_max)
