@@ -28,7 +28,7 @@ from seqsearch.carriers.crew import (
 )
 from seqsearch.carriers.flight import carrier_of
 from seqsearch.carriers.homing import HomingSettings
-from seqsearch.carriers.joint import joined_crew
+from seqsearch.carriers.joint import Wishes, joined, joined_crew
 from seqsearch.carriers.leg_chart import ChartPart
 from seqsearch.carriers.plans import RELEASES_DAYS, Plan, Screen
 from seqsearch.deadline import Deadline
@@ -395,8 +395,15 @@ def _valued(context: _Context, plans: Sequence[Plan], rate: _Rate) -> list[Plan]
 
 
 def _manned(context: _Context, plan: Plan, settings: HomingSettings) -> Crew | None:
-    crew = find_crew(context.screen, context.problem, plan, settings)
-    return crew if len(crew.flights) == len(plan.ends) else None
+    """Return the tours of a plan's probes; polished with the mother ship where she needs that."""
+    screen, problem = context.screen, context.problem
+    crew = find_crew(screen, problem, plan, settings)
+    if len(crew.flights) < len(plan.ends):
+        return None
+    if carrier_of(screen, crew) is not None:
+        return crew
+    wishes = Wishes((1.0,) * len(plan.ends))
+    return joined(screen, problem, crew, wishes, rng=np.random.default_rng(0))
 
 
 def _improved(context: _Context, crew: Crew, number: int, seed: int) -> Crew | None:

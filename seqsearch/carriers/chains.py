@@ -1,18 +1,18 @@
-"""`chained_plans`: plans with a third orbit.
+"""Plans with a third orbit: `chained_plans` finds them, `later_window` says when probes leave.
 
 She goes on from the second orbit once a probe or two have been caught there, and catches the rest
 on a third one: one more asteroid at which a probe can stay. The probes for the third orbit are
 released later, so that she has time for both changes.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final, final
 
 import numpy as np
 
 from seqsearch.carriers.homing import HomingSettings
-from seqsearch.carriers.mother import next_orbits
+from seqsearch.carriers.mother import change_costs, next_orbits
 from seqsearch.carriers.plans import Plan, Screen
 from seqsearch.carriers.routes import Route
 from seqsearch.tours.carrier.path import mass_after
@@ -139,3 +139,67 @@ def _chains(screen: Screen, plan: Plan, shift_days: float) -> Iterator[_Chain]:
 def _route(screen: Screen, first: int, begin: float, later_days: float) -> Route | None:
     window = (begin, begin + later_days)
     return screen.route(Plan((first,), (0,), (window,)))
+
+
+_TOUR_DAYS: Final = 2060.0
+"""From a departure to the capture, if a tour is short."""
+
+_WINDOW_STEP_DAYS: Final = 50.0
+_SHORT_KG: Final = 40.0
+"""Propellant that may be missing: impulses at the best time save that much."""
+
+
+def later_window(
+    screen: Screen,
+    plan: Plan,
+    number: int,
+    releases_mjd2000: Sequence[float],
+    captures_mjd2000: Sequence[float],
+) -> tuple[float, float]:
+    """Return when a probe for the third orbit had best leave, if those for the second are known.
+
+    The later it leaves the less time there is for the first change of orbit, and the more for the
+    second one.
+
+    Parameters
+    ----------
+    screen : Screen
+        Knows the way to the first orbit.
+    plan : Plan
+        With three orbits.
+    number : int
+        The probe.
+    releases_mjd2000, captures_mjd2000 : sequence of float
+        Of the probes for the second orbit.
+
+    Returns
+    -------
+    tuple of float
+        Earliest and latest departure in MJD2000; those of the plan where none is good.
+    """
+    begin, end = plan.windows_mjd2000[number]
+    route = screen.route(plan)
+    if route is None:
+        return begin, end
+    rules, orbits = screen.rules, screen.catalogue
+    alone = mass_after(rules, rules.m0_kg, route.delta_v) - rules.craft_count * rules.craft.m0_kg
+    caught = _PROBE_KG * len(captures_mjd2000)
+    released, first, last = max(releases_mjd2000), min(captures_mjd2000), max(captures_mjd2000)
+    latest = route.launch_mjd2000 + rules.max_duration_days - screen.duration_days
+    epochs = np.arange(begin - _LATE_DAYS, latest, _WINDOW_STEP_DAYS)
+    missing = np.full(len(epochs), np.inf)
+    for k, epoch in enumerate(epochs):
+        changes = (max(released, epoch), first), (last, epoch + _TOUR_DAYS)
+        if min(after - before for before, after in changes) < _WINDOW_STEP_DAYS:
+            continue
+        mass = alone
+        for orbit, between in enumerate(changes):
+            aboard = orbit * caught
+            goal = np.array([plan.orbits[orbit + 1]])
+            cost = float(change_costs(orbits, plan.orbits[orbit], goal, between)[0])
+            mass = mass_after(rules, mass + aboard, cost) - aboard if np.isfinite(cost) else 0.0
+        missing[k] = rules.m_dry_kg - mass
+    if not np.isfinite(missing).any():
+        return begin, end
+    good = epochs[missing <= max(_SHORT_KG, float(missing.min()) + _SHORT_KG)]
+    return float(good[0]), float(max(good[-1], good[0] + _WINDOW_STEP_DAYS))

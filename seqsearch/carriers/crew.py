@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.classifier.predictor import LegPredictor
+from seqsearch.carriers.chains import later_window
 from seqsearch.carriers.course import Course
 from seqsearch.carriers.homing import Homecoming, HomingSettings
 from seqsearch.carriers.plans import STAY_DAYS, Plan, Screen
@@ -381,9 +382,22 @@ def find_crew(
 ) -> Crew:
     """Return the tours of all probes, found one after another; fewer where there are no more."""
     crew = Crew(plan, ())
-    for number in range(len(plan.ends)):
+    for number, end in enumerate(plan.ends):
+        if end > 1:
+            window = _later_window(screen, crew, number)
+            crew = replace(crew, plan=crew.plan.with_window(number, window))
         flight = find_probe(screen, problem, crew, number, crew.closed(), settings)
         if flight is None:
             break
         crew = replace(crew, flights=(*crew.flights, flight))
     return crew
+
+
+def _later_window(screen: Screen, crew: Crew, number: int) -> tuple[float, float]:
+    """Return when a probe for the third orbit leaves, after those for the second one."""
+    before = [
+        flight for flight, end in zip(crew.flights, crew.plan.ends, strict=False) if end == 1
+    ]
+    releases = [float(flight.itinerary.t_dep_mjd2000[0]) for flight in before]
+    captures = [float(flight.itinerary.t_arr_mjd2000[-1]) + WAIT_DAYS for flight in before]
+    return later_window(screen, crew.plan, number, releases, captures)

@@ -7,10 +7,10 @@ from typing import Final
 import numpy as np
 
 from seqsearch.carriers.crew import MISSION_DAYS, TOUCH_DAYS, WAIT_DAYS, Crew
-from seqsearch.carriers.flight import captures_of, carrier_of, releases_of, route_of
+from seqsearch.carriers.flight import captures_of, changes_of, releases_of, route_of
+from seqsearch.carriers.mother import Change
 from seqsearch.carriers.plans import Screen
 from seqsearch.carriers.schedule import Act, Schedule, Step
-from seqsearch.tours.carrier.records import CarrierImpulse
 
 _FIRST_LEAD_DAYS: Final = 12.0
 """By how much an impulse comes before the release or capture that it is for, at first."""
@@ -20,15 +20,17 @@ _RESERVE_DAYS: Final = 15.0
 
 
 def schedule_of(screen: Screen, crew: Crew) -> Schedule | None:
-    """Return what the mother ship of a crew may do; None where she cannot fly as it is.
+    """Return what the mother ship of a crew may do; None where there is no time for it.
+
+    She need not have the propellant for it.
 
     Up to the release of the probe that stays at the first orbit's asteroid she is there, and at
     the capture of the one that stays at each other orbit's. Before each other release and capture
     there is an impulse.
     """
     route = route_of(screen, crew)
-    carrier = carrier_of(screen, crew)
-    if route is None or carrier is None:
+    changes = changes_of(screen, crew) if crew.course is None else []
+    if route is None or changes is None:
         return None
     rules = screen.rules
     if crew.course is None:
@@ -36,7 +38,6 @@ def schedule_of(screen: Screen, crew: Crew) -> Schedule | None:
         earliest = max(captures_of(crew)) + _RESERVE_DAYS - rules.max_duration_days
         other = screen.cheapest_route(crew.plan.first, earliest, min(releases_of(crew)))
         route = other if other is not None and other.delta_v < route.delta_v else route
-    impulses = list(carrier.impulses[2:])
     count = len(crew.flights)
     if crew.course is None:
         stays = _stays(crew)
@@ -45,13 +46,12 @@ def schedule_of(screen: Screen, crew: Crew) -> Schedule | None:
         steps = _release_steps(releases, stays[0])
         for orbit in range(1, len(crew.plan.orbits)):
             captures = [(ends[k], k) for k in range(count) if crew.plan.ends[k] == orbit]
-            change = impulses[2 * orbit - 2 : 2 * orbit]
-            steps += _capture_steps(sorted(captures), stays[orbit], change)
+            steps += _capture_steps(sorted(captures), stays[orbit], changes[orbit - 1])
     else:
         stays = crew.course.stays
         releases = sorted(zip(releases_of(crew), range(count), strict=True))
         captures = sorted(zip(captures_of(crew), range(count), strict=True))
-        steps = _steps_again(crew, releases, captures, impulses)
+        steps = _steps_again(crew, releases, captures)
     steps[0] = replace(steps[0], range_mjd2000=(route.second_mjd2000 + TOUCH_DAYS, np.inf))
     for number in stays[1:]:
         if number is not None:
@@ -123,11 +123,9 @@ def _release_steps(releases: _Epochs, stay: int | None) -> list[Step]:
     return steps
 
 
-def _capture_steps(
-    captures: _Epochs, stay: int | None, change: list[CarrierImpulse]
-) -> list[Step]:
+def _capture_steps(captures: _Epochs, stay: int | None, change: Change) -> list[Step]:
     """Return the steps of a mother ship that goes on to an orbit and catches some probes there."""
-    leave, arrive = change
+    leave, arrive = change.impulses
     order = [number for _, number in captures]
     before = 0 if stay is None else order.index(stay)
     steps: list[Step] = []
@@ -150,9 +148,7 @@ def _capture_steps(
     return steps
 
 
-def _steps_again(
-    crew: Crew, releases: _Epochs, captures: _Epochs, impulses: list[CarrierImpulse]
-) -> list[Step]:
+def _steps_again(crew: Crew, releases: _Epochs, captures: _Epochs) -> list[Step]:
     """Return the steps of a mother ship that is on a course already."""
     course = crew.course
     assert course is not None
@@ -166,7 +162,7 @@ def _steps_again(
         orbit = 0 if act is Act.RELEASE else crew.plan.ends[number]
         stays = number == course.stays[orbit]
         steps.append(Step(act, epoch, number, free=away, stays=stays))
-    for k, impulse in enumerate(impulses, 1):
+    for k, impulse in enumerate(course.impulses, 1):
         if k + 1 in course.settled:
             steps.append(Step(Act.DEPART, impulse.t_mjd2000))
         elif k in course.settled:

@@ -46,7 +46,7 @@ def carrier_of(screen: Screen, crew: Crew) -> Carrier | None:
     if min(releases) < route.second_mjd2000:
         return None
     if crew.course is None:
-        changes = _changes(screen, crew, releases, captures)
+        changes = changes_of(screen, crew)
         if changes is None:
             return None
         impulses = tuple(impulse for change in changes for impulse in change.impulses)
@@ -67,11 +67,13 @@ def carrier_of(screen: Screen, crew: Crew) -> Carrier | None:
     return None if long or many or path.propellant_left_kg < 0.0 else carrier
 
 
-def _changes(
-    screen: Screen, crew: Crew, releases: list[float], captures: list[float]
-) -> list[Change] | None:
-    """Return the cheapest changes from each orbit to the next; None where there is no time."""
+def changes_of(screen: Screen, crew: Crew) -> list[Change] | None:
+    """Return the cheapest changes from each orbit to the next; None where there is no time.
+
+    For a crew without a course. She may not have the propellant for them.
+    """
     plan, changes = crew.plan, []
+    releases, captures = releases_of(crew), captures_of(crew)
     caught = list(zip(plan.ends, captures, strict=True))
     for orbit in range(1, len(plan.orbits)):
         begin = max(*releases, *[epoch for end, epoch in caught if end < orbit]) + TOUCH_DAYS

@@ -118,6 +118,8 @@ def joined(
 ) -> Crew | None:
     """Return a crew whose tours are shorter by given wishes; None for none.
 
+    Of a crew that its mother ship cannot serve as it is, any that she can.
+
     Parameters
     ----------
     screen, problem, crew, rng
@@ -130,6 +132,8 @@ def joined(
     if len(crew.plan.orbits) == 1 or screen.catalogue.ephemeris is not None:
         return None
     best, value = crew, _value(crew, wishes)
+    if carrier_of(screen, crew) is None:
+        value = -np.inf
     for turn in range(_ROUNDS):
         found = _once(screen, problem, best, wishes, rng, stirred if turn == 0 else 0.0)
         if found is None or _value(found, wishes) < value + _WORTH_DAYS:
