@@ -18,19 +18,12 @@ import numpy as np
 from feasibility.runtime.cluster import shared
 from seqsearch.carriers.chains import chained_plans
 from seqsearch.carriers.chart_files import has_chart, write_chart
-from seqsearch.carriers.crew import (
-    Crew,
-    find_crew,
-    find_probe,
-    polished_probe,
-    rebuilt_probe,
-    repaired_probe,
-)
+from seqsearch.carriers.crew import Crew
 from seqsearch.carriers.flight import carrier_of
 from seqsearch.carriers.homing import HomingSettings
-from seqsearch.carriers.joint import Wishes, joined, joined_crew
+from seqsearch.carriers.improving import improved, manned
 from seqsearch.carriers.leg_chart import ChartPart
-from seqsearch.carriers.plans import RELEASES_DAYS, Plan, Screen
+from seqsearch.carriers.plans import Plan, Screen
 from seqsearch.deadline import Deadline
 from seqsearch.problems.rendezvous import RendezvousProblem
 from seqsearch.tours.carrier.records import CarrierRules
@@ -46,18 +39,6 @@ _KEPT_PLANS: Final = 5000
 
 _BATCHES: Final = (60, 12, 12, 1, 2)
 """Plans in a task of each stage that rates: a task takes half a second and more."""
-
-_TWO_ANEW: Final = 0.2
-_ANEW: Final = 0.2
-_REBUILT: Final = 0.2
-_REPAIRED: Final = 0.3
-"""Shares of attempts to improve; the rest are polished."""
-
-_JOINED: Final = (0.1, 0.05)
-"""Share of attempts before them that polish all at once: for a crew that has not been, and has."""
-
-_WIDTHS: Final = (300.0, 5000.0)
-"""Widths of beams that improve a tour."""
 
 _SHARES: Final = (0.15, 0.2, 0.26, 0.36, 0.48, 0.66)
 """Shares of a time limit after which the stages before improving end."""
@@ -91,8 +72,8 @@ class CampaignSettings:
     rated: int = 100_000
     sifted: int = 4000
     continued: int = 150
-    chained: int = 150
-    judged: int = 600
+    chained: int = 300
+    judged: int = 900
     manned: int = 150
     improvements: int = 400
     kept: int = 6
@@ -395,52 +376,11 @@ def _valued(context: _Context, plans: Sequence[Plan], rate: _Rate) -> list[Plan]
 
 
 def _manned(context: _Context, plan: Plan, settings: HomingSettings) -> Crew | None:
-    """Return the tours of a plan's probes; polished with the mother ship where she needs that."""
-    screen, problem = context.screen, context.problem
-    crew = find_crew(screen, problem, plan, settings)
-    if len(crew.flights) < len(plan.ends):
-        return None
-    if carrier_of(screen, crew) is not None:
-        return crew
-    wishes = Wishes((1.0,) * len(plan.ends))
-    return joined(screen, problem, crew, wishes, rng=np.random.default_rng(0))
+    return manned(context.screen, context.problem, plan, settings)
 
 
 def _improved(context: _Context, crew: Crew, number: int, seed: int) -> Crew | None:
-    """Look for a better tour of one probe: anew, from some visit on, or by exchanges."""
-    screen, problem = context.screen, context.problem
-    rng = np.random.default_rng(seed)
-    if rng.random() < _JOINED[crew.course is not None]:
-        return joined_crew(screen, problem, crew, rng)
-    settings = HomingSettings(
-        width=int(np.exp(rng.uniform(*np.log(_WIDTHS)))),
-        propellant_weight=float(rng.uniform(0.1, 0.6)),
-        distance_weight=float(rng.uniform(0.05, 0.5)),
-        results=int(rng.integers(2, 12)),
-    )
-    weights, offset = (settings.propellant_weight,), float(rng.uniform(0.0, RELEASES_DAYS))
-    kind = rng.random()
-    if kind < _TWO_ANEW:
-        other = int((number + rng.integers(1, len(crew.flights))) % len(crew.flights))
-        closed = crew.closed(number, other)
-        for probe in (other, number):
-            found = find_probe(screen, problem, crew, probe, closed, settings, offset, weights)
-            if found is None:
-                return None
-            crew = crew.with_flight(probe, found)
-            closed = crew.closed(number)
-        return crew
-    if kind < _TWO_ANEW + _ANEW:
-        closed = crew.closed(number)
-        flight = find_probe(screen, problem, crew, number, closed, settings, offset, weights)
-    elif kind < _TWO_ANEW + _ANEW + _REBUILT:
-        kept = int(rng.integers(1, len(crew.flights[number].itinerary) - 2))
-        flight = rebuilt_probe(screen, problem, crew, number, kept, settings)
-    elif kind < _TWO_ANEW + _ANEW + _REBUILT + _REPAIRED:
-        flight = repaired_probe(screen, problem, crew, number, rng)
-    else:
-        flight = polished_probe(problem, screen.predictor, crew, number, seed)
-    return None if flight is None else crew.with_flight(number, flight)
+    return improved(context.screen, context.problem, crew, number, seed)
 
 
 @functools.lru_cache(maxsize=1)

@@ -32,7 +32,7 @@ _RETURN_DAYS: Final = 2160.0
 _PROBE_KG: Final = 850.0
 """Mass of a probe that is caught."""
 
-_SHIFTS_DAYS: Final = (0.0, 225.0)
+_SHIFTS_DAYS: Final = (-200.0, 0.0, 200.0)
 """Beginnings of the windows that are tried, after that of a plan with fewer orbits."""
 
 _HOPEFUL: Final = 1.04
@@ -41,8 +41,8 @@ _HOPEFUL: Final = 1.04
 _MOST: Final = 80
 """Second orbits that are gone on from."""
 
-_RATED: Final = 10
-_KEPT: Final = 6
+_RATED: Final = 16
+_KEPT: Final = 8
 """Chains that are rated for all probes, by the sum of their ends' ratings, and kept."""
 
 
