@@ -61,6 +61,11 @@ _MOST_LOST: Final = 3
 _VISIT_DAYS: Final = 170.0
 """What a visit takes."""
 
+_DAYS_WORTH: Final = 0.25
+_MOST_SHARES: Final = 1.7
+"""What as many days as a visit takes are worth, and up to how many of them count: less than a
+visit in any case."""
+
 
 @final
 @dataclass(frozen=True, eq=False)
@@ -98,12 +103,23 @@ class Crew:
         return float(sum(flight.mass[-1] for flight in self.flights))
 
     def worth(self) -> float:
-        """Return the visits, and what the days that are left are worth.
+        """Return the visits, and what the days that are left after all stays are worth.
 
-        Days of one probe are worth more than as many of two: a visit needs them together.
+        Days of one probe are worth more than as many of two: a visit needs them together. More than
+        a visit takes are worth more still, as hardly any tour has one for exactly that.
         """
-        days = [MISSION_DAYS - flight.itinerary.duration_days for flight in self.flights]
-        return self.visits() + 0.3 * sum(min(left / _VISIT_DAYS, 1.0) ** 2 for left in days)
+        waits = self.waits()
+        days = self._days_left(waits)
+        shares = [min(max(left, 0.0) / _VISIT_DAYS, _MOST_SHARES) for left in days]
+        return self.visits() + _DAYS_WORTH * sum(share**2 for share in shares)
+
+    def _days_left(self, waits: Sequence[int | None]) -> list[float]:
+        """Return the days that each probe has left if some stay at the orbits' asteroids."""
+        left = [MISSION_DAYS - flight.itinerary.duration_days for flight in self.flights]
+        for orbit, probe in enumerate(waits):
+            if probe is not None:
+                left[probe] -= self._wait_days(orbit)
+        return left
 
     def closed(self, *but: int) -> tuple[int, ...]:
         """Return rows that probes visit, those of some probes left out."""
@@ -120,10 +136,9 @@ class Crew:
         At that of the first one after its release, at the others before the capture. None where
         no probe has the time. On a course only those that it provides for.
         """
-        slack = [MISSION_DAYS - flight.itinerary.duration_days for flight in self.flights]
         course, plan = self.course, self.plan
         ways: list[list[int | None]] = [
-            [k for k in range(len(slack)) if orbit in (0, plan.ends[k])]
+            [k for k in range(len(self.flights)) if orbit in (0, plan.ends[k])]
             for orbit in range(len(plan.orbits))
         ]
         if course is not None:
@@ -131,10 +146,7 @@ class Crew:
         best: tuple[int | None, ...] = (None,) * len(ways)
         value = (0, -np.inf)
         for probes in product(*[[*way, None] for way in ways]):
-            left = list(slack)
-            for orbit, probe in enumerate(probes):
-                if probe is not None:
-                    left[probe] -= self._wait_days(orbit)
+            left = self._days_left(probes)
             count = sum(probe is not None for probe in probes)
             if min(left, default=0.0) >= 0.0 and (count, min(left, default=0.0)) > value:
                 best, value = probes, (count, min(left, default=0.0))

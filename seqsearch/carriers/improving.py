@@ -24,7 +24,7 @@ _REBUILT: Final = 0.2
 _REPAIRED: Final = 0.3
 """Shares of attempts to improve; the rest are polished."""
 
-_JOINED: Final = (0.1, 0.05)
+_JOINED: Final = (0.25, 0.08)
 """Share of attempts before them that polish all at once: for a crew that has not been, and has."""
 
 _WIDTHS: Final = (300.0, 5000.0)
