@@ -105,8 +105,8 @@ class Crew:
     def worth(self) -> float:
         """Return the visits, and what the days that are left after all stays are worth.
 
-        Days of one probe are worth more than as many of two: a visit needs them together. More than
-        a visit takes are worth more still, as hardly any tour has one for exactly that.
+        Days of one probe are worth more than as many of two: a visit needs them together. More
+        than a visit takes are worth more still, as hardly any tour has one for exactly that.
         """
         waits = self.waits()
         days = self._days_left(waits)
