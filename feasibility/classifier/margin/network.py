@@ -109,7 +109,9 @@ class MarginNet:
         x = np.random.default_rng(0).standard_normal((1, _BLOCK, self.inputs)).astype(np.float32)
         whole = self._forward(x)
         return all(
-            np.array_equal(self._forward(x.reshape(-1, rows, self.inputs)).reshape(whole.shape), whole)
+            np.array_equal(
+                self._forward(x.reshape(-1, rows, self.inputs)).reshape(whole.shape), whole
+            )
             for rows in _SMALL_BLOCKS
         )
 
