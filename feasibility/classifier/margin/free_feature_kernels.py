@@ -302,7 +302,7 @@ def quick_excess(
 
     0 where the direct Lambert arc needs none, SATURATED where there is no path.
     """
-    path_work, ends, elements, _, _, v1, v2, over, _, _, _, _, _ = ends_work
+    path_work, ends, elements, _, _, v1, v2, over, _, _, _, _ = ends_work
     lambert(s0[:3], s1[:3], tof, int(0), 1.0, v1, v2)
     over[0] = SATURATED
     if not math.isnan(v1[0, 0]):
@@ -363,7 +363,7 @@ def free_quick_features(
     Rough excess velocities, and the first path between the ends that they lead to. Parameters
     and result as for `free_leg_features`.
     """
-    path_work, ends, elements, _, _, _, _, over, _, _, _, _, _ = ends_work
+    path_work, ends, elements, _, _, _, _, over, _, _, _, _ = ends_work
     _, _, p, weights, g, _, d, _ = path_work
     states, axes, _ = scratch
     s0, s1, m0, m1, scaled = states[0], states[1], states[2], states[3], states[4]
@@ -432,7 +432,7 @@ def left_acceleration(
     b: int, s0: _Array, s1: _Array, bounds: _Array, speed: float, ends_work: EndsWork
 ) -> float:
     """Return MIMA's acceleration times the flight time, of what the bounds leave of an arc."""
-    _, ends, _, _, _, v1, v2, _, _, _, _, _, _ = ends_work
+    _, ends, _, _, _, v1, v2, _, _, _, _, _ = ends_work
     cut_excess(v1[b], s0, bounds[0] / speed, ends[2])
     cut_excess(v2[b], s1, bounds[1] / speed, ends[3])
     for j in range(3):

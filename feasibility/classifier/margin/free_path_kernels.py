@@ -30,8 +30,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.classifier.margin.feature_kernels import MAX_REVS, add_impulse
-from feasibility.classifier.margin.lanes.layout_kernels import ODD, S0, X0, at, lane_workspace
-from feasibility.classifier.margin.lanes.path_kernels import elements as elements_of_lanes
 from feasibility.classifier.margin.path_kernels import (
     SATURATED,
     STRIDE,
@@ -51,7 +49,6 @@ from feasibility.sims_flanagan.fast.element_kernels import to_elements
 _Array = NDArray[np.float64]
 EndsWork = tuple[
     PathWork,
-    _Array,
     _Array,
     _Array,
     _Array,
@@ -221,7 +218,7 @@ def bounded_impulse(
 @inner_kernel
 def read_excess(end: int, bound: float, own: _Array, segments: int, work: EndsWork) -> None:
     """Write the excess velocity that the last solution has at an end, within its bound."""
-    path_work, ends, _, _, local, _, _, _, _, _, _, _, _ = work
+    path_work, ends, _, _, local, _, _, _, _, _, _, _ = work
     weights, g = path_work[3], path_work[4]
     state, excess = ends[end], ends[2 + end]
     i = segments + end
@@ -262,55 +259,21 @@ def lay_rows(tof: float, segments: int, path_work: PathWork) -> bool:
 
 
 @inner_kernel
-def lay_ends(s0: _Array, s1: _Array, ends: _Array, elements: _Array) -> bool:
-    """Write the states with excess and their elements; return False off the ellipses."""
-    lay_states(s0, s1, ends)
-    return to_elements(ends[0], elements[0]) and to_elements(ends[1], elements[1])
-
-
-@inner_kernel
-def lay_states(s0: _Array, s1: _Array, ends: _Array) -> None:
-    """Write the states with excess."""
+def lay_departure(s0: _Array, ends: _Array, elements: _Array) -> bool:
+    """Write the departure with its excess and its elements; return False off the ellipses."""
     for j in range(3):
         ends[0, j] = s0[j]
-        ends[1, j] = s1[j]
         ends[0, 3 + j] = s0[3 + j] + ends[2, j]
-        ends[1, 3 + j] = s1[3 + j] + ends[3, j]
+    return to_elements(ends[0], elements[0])
 
 
 @inner_kernel
-def lay_moved_ends(s0: _Array, s1: _Array, work: EndsWork) -> bool:
-    """Move the ends a part of the way to the excess velocities; return False off the ellipses.
-
-    Writes states and elements as `lay_ends` does, and those of the departure with all of its
-    excess, from where the impulses are to be added up, as third ones: of the moved one where
-    there are none. All three at once, each in a lane.
-    """
-    _, ends, elements, _, _, _, _, _, _, _, _, _, W = work
-    before = ends[5:]
-    for j in range(6):
-        before[0, j], before[1, j] = ends[0, j], ends[1, j]
+def lay_ends(s0: _Array, s1: _Array, ends: _Array, elements: _Array) -> bool:
+    """Write the states with excess and their elements; return False off the ellipses."""
     for j in range(3):
-        ends[4, j], ends[4, 3 + j] = s0[j], s0[3 + j] + ends[2, j]
-    move_part(s0, before[0], ends[2])
-    move_part(s1, before[1], ends[3])
-    lay_states(s0, s1, ends)
-    for state in range(3):
-        row = (0, 1, 4)[state]
-        for j in range(6):
-            W[at(S0 + j, state)] = ends[row, j]
-        W[at(ODD, state)] = 0.0
-    elements_of_lanes(W)
-    for state in range(3):
-        if W[at(ODD, state)] == 0.0:
-            for j in range(6):
-                elements[state, j] = W[at(X0 + j, state)]
-        elif not to_elements(ends[(0, 1, 4)[state]], elements[state]):
-            if state < 2:
-                return False
-            for j in range(6):
-                elements[2, j] = elements[0, j]
-    return True
+        ends[1, j] = s1[j]
+        ends[1, 3 + j] = s1[3 + j] + ends[3, j]
+    return lay_departure(s0, ends, elements) and to_elements(ends[1], elements[1])
 
 
 @inner_kernel
@@ -347,7 +310,7 @@ def lay_lambert(
     b: int, s0: _Array, s1: _Array, tof: float, dep: float, arr: float, work: EndsWork
 ) -> bool:
     """Write path, rows and d of a Lambert arc; return whether there is one, and an ellipse."""
-    path_work, ends, elements, _, _, v1, v2, _, _, _, _, _, _ = work
+    path_work, ends, elements, _, _, v1, v2, _, _, _, _, _ = work
     path, rows, _, _, _, _, d, _ = path_work
     if math.isnan(v1[b, 0]):
         return False
@@ -414,7 +377,7 @@ def lay_start(
     q: int, s0: _Array, s1: _Array, tof: float, dep: float, arr: float, work: EndsWork
 ) -> bool:
     """Write path, rows and d of the q-th start; return whether there is one."""
-    path_work, ends, elements, _, _, v1, v2, _, _, _, _, _, _ = work
+    path_work, ends, elements, _, _, v1, v2, _, _, _, _, _ = work
     if q < BRANCHES:
         return lay_lambert(q, s0, s1, tof, dep, arr, work)
     beside = (0, 1, -1, 0)[q - BRANCHES]
@@ -455,7 +418,7 @@ def cheapest_branch(s0: _Array, s1: _Array, dep: float, arr: float, work: EndsWo
 
     The sums of impulses that are left are written.
     """
-    _, ends, _, _, _, v1, v2, over, _, _, _, _, _ = work
+    _, ends, _, _, _, v1, v2, over, _, _, _, _ = work
     best = -1
     for b in range(BRANCHES):
         over[b] = SATURATED
@@ -490,8 +453,9 @@ def pursue(
     the best z so far, comes to the same path as that one, or has converged. `z_rounds` holds the
     z of each round.
     """
-    path_work, ends, elements, flown, _, _, _, over, z_rounds, _, _, _, _ = work
+    path_work, ends, elements, flown, _, _, _, over, z_rounds, _, _, _ = work
     path, rows, p, weights, g, c, _, _ = path_work
+    before = ends[5:]
     if not lay_start(q, s0, s1, tof, dep, arr, work):
         return SATURATED
     guess = _TYPICAL_IMPULSE / SEGMENTS
@@ -515,9 +479,17 @@ def pursue(
                 return max(z, rival)
         read_excess(int(0), dep, s0, int(SEGMENTS), work)
         read_excess(int(1), arr, s1, int(SEGMENTS), work)
-        if not lay_moved_ends(s0, s1, work):
+        for j in range(6):
+            before[0, j], before[1, j] = ends[0, j], ends[1, j]
+        bound_path = lay_departure(s0, ends, elements)
+        if bound_path:
+            flown_path(elements[0], rows, weights, g, tof, int(SEGMENTS), flown)
+        move_part(s0, before[0], ends[2])
+        move_part(s1, before[1], ends[3])
+        if not lay_ends(s0, s1, ends, elements):
             return z if k > _NEEDED_ROUNDS else SATURATED
-        flown_path(elements[2], rows, weights, g, tof, int(SEGMENTS), flown)
+        if not bound_path:
+            flown_path(elements[0], rows, weights, g, tof, int(SEGMENTS), flown)
         last = SEGMENTS - 1
         longitude = flown[5 * STRIDE + last] + 0.5 * tof / SEGMENTS * flown[last]
         elements[1, 5] += _TWO_PI * np.rint((longitude - elements[1, 5]) / _TWO_PI)
@@ -552,7 +524,7 @@ def find_excess(
     tof, ve, dep, arr : float
         Flight time, exhaust velocity and bounds of the excess velocities, inf allowed.
     work : tuple of arrays
-        `ends_workspace`; three of its last receive z of the rounds from the best start, z of all
+        `ends_workspace`; its last three receive z of the rounds from the best start, z of all
         starts, and the excess velocities.
 
     Returns
@@ -560,7 +532,7 @@ def find_excess(
     int
         The start; BALLISTIC where a Lambert arc needs no thrust, -1 where no start has a path.
     """
-    _, ends, _, _, _, v1, v2, over, z_rounds, best_rounds, z_starts, best_ends, _ = work
+    _, ends, _, _, _, v1, v2, over, z_rounds, best_rounds, z_starts, best_ends = work
     lambert(s0[:3], s1[:3], tof, MAX_REVS, 1.0, v1, v2)
     branch = cheapest_branch(s0, s1, dep, arr, work)
     for q in range(N_STARTS):
@@ -590,15 +562,14 @@ def find_excess(
 def ends_workspace() -> EndsWork:
     """Return scratch arrays of a leg with free ends.
 
-    The path's; states with excess, excess velocities and three more; elements of the ends and one
-    more; flown path; axes; Lambert velocities at departure and arrival; what they exceed the
-    bounds by; z of the rounds, and of the best start; z of the starts; excess velocities of the
-    best; what the lanes want.
+    The path's; states with excess, excess velocities and one more; elements of the ends; flown
+    path; axes; Lambert velocities at departure and arrival; what they exceed the bounds by; z of
+    the rounds, and of the best start; z of the starts; excess velocities of the best.
     """
     return (
         workspace(),
         np.zeros((7, 6)),
-        np.empty((3, 6)),
+        np.empty((2, 6)),
         np.empty(6 * STRIDE),
         np.empty((3, 3)),
         np.empty((BRANCHES, 3)),
@@ -608,5 +579,4 @@ def ends_workspace() -> EndsWork:
         np.empty(ROUNDS + 1),
         np.empty(N_STARTS),
         np.empty((2, 3)),
-        lane_workspace(),
     )

@@ -110,7 +110,7 @@ def follow(
 
     These are replaced by better ones. SATURATED where there is no path.
     """
-    path_work, ends, elements, flown, _, _, _, _, _, _, _, _, _ = work
+    path_work, ends, elements, flown, _, _, _, _, _, _, _, _ = work
     path, rows, _, weights, g, _, _, _ = path_work
     before = ends[5:]
     if not lay_ends(s0, s1, ends, elements):
@@ -188,7 +188,7 @@ def free_propellant_batch(
         what the bounds leave of the cheapest Lambert arc; 0 where there is none.
     """
     work = ends_workspace()
-    _, ends, elements, _, _, v1, v2, over, _, _, _, best_ends, _ = work
+    _, ends, elements, _, _, v1, v2, over, _, _, _, best_ends = work
     axes, bound = np.empty((3, 3)), np.empty(SEGMENTS)
     s0, s1 = np.empty(6), np.empty(6)
     for leg in range(len(tof_s)):

@@ -30,11 +30,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.classifier.margin.lanes.math_kernels import (
-    inverse_cube_root,
-    sine_cosine,
-    small_sine_cosine,
-)
+from feasibility.classifier.margin.lanes.math_kernels import inverse_cube_root, sine_cosine
 from feasibility.runtime.jit import inner_kernel, kernel, lane_function, summing_kernel
 
 _Array = NDArray[np.float64]
@@ -52,33 +48,12 @@ SATURATED = 1e3
 _LEAST_MOTION = 0.15
 _LARGEST_ECCENTRICITY2 = 0.9**2
 _SINGULAR = 1e-14
-_SMALL_TURN = 0.8
 
 
 @lane_function
 def whole_vectors(nodes: int) -> int:
     """Return how many nodes fill vectors of eight, so that a loop over them has no rest."""
     return min((nodes + 7) >> 3, STRIDE >> 3) << 3
-
-
-@summing_kernel
-def step_back(padded: int, anomaly: _Array) -> float:
-    """Turn the sines and cosines back by the steps taken; return the largest step."""
-    largest = 0.0
-    for i in range(padded):
-        largest = max(largest, abs(anomaly[5 * STRIDE + i]))
-    if largest < _SMALL_TURN:
-        for i in range(padded):
-            sine, cosine = small_sine_cosine(anomaly[5 * STRIDE + i])
-            s, c = anomaly[3 * STRIDE + i], anomaly[4 * STRIDE + i]
-            anomaly[3 * STRIDE + i] = s * cosine - c * sine
-            anomaly[4 * STRIDE + i] = c * cosine + s * sine
-    else:
-        for i in range(padded):
-            s, c = sine_cosine(anomaly[2 * STRIDE + i])
-            anomaly[3 * STRIDE + i] = s
-            anomaly[4 * STRIDE + i] = c
-    return largest
 
 
 @summing_kernel
@@ -116,12 +91,11 @@ def impulse_effects(path: _Array, nodes: int, rows: _Array, anomaly: _Array) -> 
         s, c = sine_cosine(longitude)
         # Halley's step from the mean longitude: mostly one more is enough.
         slope, curve = 1.0 - ex * c - ey * s, ex * s - ey * c
-        step = -curve / (slope + 0.5 * curve * curve / slope)
-        anomaly[2 * STRIDE + i] = longitude - step
+        anomaly[2 * STRIDE + i] = longitude + curve / (slope + 0.5 * curve * curve / slope)
+    for i in range(padded):
+        s, c = sine_cosine(anomaly[2 * STRIDE + i])
         anomaly[3 * STRIDE + i] = s
         anomaly[4 * STRIDE + i] = c
-        anomaly[5 * STRIDE + i] = step
-    step_back(padded, anomaly)
     for _ in range(12):
         for i in range(padded):
             ex, ey = path[STRIDE + i], path[2 * STRIDE + i]
@@ -133,7 +107,14 @@ def impulse_effects(path: _Array, nodes: int, rows: _Array, anomaly: _Array) -> 
             step = min(1.0, max(-1.0, gap / (slope - 0.5 * newton * curve)))
             anomaly[2 * STRIDE + i] -= step
             anomaly[5 * STRIDE + i] = step
-        if step_back(padded, anomaly) < 1e-3:
+        for i in range(padded):
+            s, c = sine_cosine(anomaly[2 * STRIDE + i])
+            anomaly[3 * STRIDE + i] = s
+            anomaly[4 * STRIDE + i] = c
+        largest = 0.0
+        for i in range(padded):
+            largest = max(largest, abs(anomaly[5 * STRIDE + i]))
+        if largest < 1e-3:
             break
     for i in range(padded):
         n, ex, ey = path[i], path[STRIDE + i], path[2 * STRIDE + i]

@@ -495,7 +495,7 @@ def compared(W: _Array) -> None:
 @lane_kernel
 def solve_alone(W: _Array, ends_work: EndsWork) -> None:
     """Solve Lambert's problem of the LOOSE legs; those without a solution are ODD."""
-    _, ends, _, _, _, v1, v2, _, _, _, _, _, _ = ends_work
+    _, ends, _, _, _, v1, v2, _, _, _, _, _ = ends_work
     for lane in range(LANES):
         if W[at(LOOSE, lane)] == 0.0:
             continue
