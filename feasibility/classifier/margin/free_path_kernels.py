@@ -84,8 +84,8 @@ _SLOWEST = 0.3
 _FIRST_STEPS = 3
 _NEXT_STEPS = 2
 _NEEDED_ROUNDS = 2
-_CONVERGED = 3e-5
-_NEARLY_CONVERGED = 3e-3
+_CONVERGED = 1e-5
+_NEARLY_CONVERGED = 1e-3
 _ALIKE = 1e-3
 
 
@@ -256,6 +256,13 @@ def lay_rows(tof: float, segments: int, path_work: PathWork) -> bool:
     anomaly[segments] = tof
     anomaly[segments + 1] = 0.0
     return impulse_effects(path, segments + 2, rows, anomaly)
+
+
+@inner_kernel
+def bound(s: _Array, excess: _Array) -> bool:
+    """Return whether a body with an excess velocity is on an ellipse."""
+    speed2 = (s[3] + excess[0]) ** 2 + (s[4] + excess[1]) ** 2 + (s[5] + excess[2]) ** 2
+    return bool(2.0 / math.sqrt(s[0] * s[0] + s[1] * s[1] + s[2] * s[2]) - speed2 > 1e-6)
 
 
 @inner_kernel
@@ -481,7 +488,7 @@ def pursue(
         read_excess(int(1), arr, s1, int(SEGMENTS), work)
         for j in range(6):
             before[0, j], before[1, j] = ends[0, j], ends[1, j]
-        bound_path = lay_departure(s0, ends, elements)
+        bound_path = bound(s1, ends[3]) and lay_departure(s0, ends, elements)
         if bound_path:
             flown_path(elements[0], rows, weights, g, tof, int(SEGMENTS), flown)
         move_part(s0, before[0], ends[2])
