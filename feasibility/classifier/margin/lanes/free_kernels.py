@@ -44,8 +44,6 @@ from feasibility.classifier.margin.lanes.layout_kernels import (
     NODES,
     ODD,
     OVER,
-    OVER_LEFT,
-    OVER_UNIT,
     PATH,
     RATIO,
     REMAINING,
@@ -81,7 +79,7 @@ from feasibility.classifier.margin.lanes.path_kernels import (
 from feasibility.classifier.margin.lanes.rendezvous_kernels import clip, coast, geometry, need
 from feasibility.classifier.margin.path_kernels import SATURATED
 from feasibility.orbits.lambert_kernels import lambert as lambert_alone
-from feasibility.runtime.jit import kernel, lane_function, lane_kernel
+from feasibility.runtime.jit import kernel, lane_kernel
 
 _Array = NDArray[np.float64]
 
@@ -206,7 +204,7 @@ def begin(W: _Array) -> None:
             W[at(S1 + 3 + j, lane)] = W[at(BODY1 + 3 + j, lane)] + W[at(EXCESS1 + j, lane)]
 
 
-@lane_function
+@lane_kernel
 def local_axes(end: int, W: _Array) -> None:
     """Write the radial, transverse and normal directions at a state, S0 or S1, as AXES."""
     s = S0 + 6 * end
@@ -229,7 +227,7 @@ def local_axes(end: int, W: _Array) -> None:
         W[at(AXES + 8, lane)] = hz
 
 
-@lane_function
+@lane_kernel
 def add_excess(end: int, W: _Array) -> None:
     """Add to D the effect of a bounded excess velocity at its end."""
     local_axes(end, W)
@@ -339,7 +337,7 @@ def solve_ends(W: _Array) -> None:
     bounded_impulse(W)
 
 
-@lane_function
+@lane_kernel
 def read_excess(end: int, W: _Array) -> None:
     """Write the excess velocity of the last solution at an end, bounded and not too far away."""
     local_axes(end, W)
@@ -389,18 +387,6 @@ def read_excess(end: int, W: _Array) -> None:
         W[at(e + 2, lane)] = hz + share * z
 
 
-@lane_function
-def to_axes(o: int, over_unit: int, W: _Array) -> None:
-    """Turn a vector (3 rows) into AXES, in another unit."""
-    for lane in range(LANES):
-        x, y, z = W[at(o, lane)], W[at(o + 1, lane)], W[at(o + 2, lane)]
-        scale = W[at(over_unit, lane)]
-        for k in range(3):
-            a = AXES + 3 * k
-            turned = x * W[at(a, lane)] + y * W[at(a + 1, lane)] + z * W[at(a + 2, lane)]
-            W[at(o + k, lane)] = turned * scale
-
-
 @lane_kernel
 def to_moved_frame(W: _Array) -> None:
     """Move the ends by the excess velocities; then all in the frame of the departure orbit.
@@ -430,18 +416,22 @@ def to_moved_frame(W: _Array) -> None:
         W[at(DEP, lane)] *= over_speed
         W[at(ARR, lane)] *= over_speed
         W[at(GUESS, lane)] = max(W[at(TOTAL, lane)] * over_speed, 1e-9) / NODES
-    for lane in range(LANES):
-        W[at(OVER_UNIT, lane)] = 1.0 / W[at(UNIT, lane)]
-        W[at(OVER_LEFT, lane)] = 1.0 / W[at(LEFT, lane)]
-    to_axes(int(S0), int(OVER_LEFT), W)
-    to_axes(int(S0 + 3), int(OVER_UNIT), W)
-    to_axes(int(S1), int(OVER_LEFT), W)
-    to_axes(int(S1 + 3), int(OVER_UNIT), W)
-    to_axes(int(EXCESS0), int(OVER_UNIT), W)
-    to_axes(int(EXCESS1), int(OVER_UNIT), W)
+    for part in range(6):
+        o = S0 + 3 * part if part < 4 else EXCESS0 + 3 * (part - 4)
+        for lane in range(LANES):
+            over_speed = 1.0 / W[at(UNIT, lane)]
+            over_unit = over_speed if (part % 2 == 1) | (part > 3) else 1.0 / W[at(LEFT, lane)]
+            x, y, z = W[at(o, lane)], W[at(o + 1, lane)], W[at(o + 2, lane)]
+            for k in range(3):
+                a = AXES + 3 * k
+                turned = x * W[at(a, lane)] + y * W[at(a + 1, lane)] + z * W[at(a + 2, lane)]
+                W[at(SCRATCH + k, lane)] = turned * over_unit
+        for k in range(3):
+            for lane in range(LANES):
+                W[at(o + k, lane)] = W[at(SCRATCH + k, lane)]
 
 
-@lane_function
+@lane_kernel
 def end_features(end: int, W: _Array) -> None:
     """Write N_END features of an end: bound, and excess velocity in the local frame."""
     local_axes(end, W)

@@ -30,9 +30,9 @@ TOF, VE, NEAR, IMPULSE, VALUE, TOTAL = ONES, ONES + 1, ONES + 2, ONES + 3, ONES 
 DONE, GAP, LENGTH, DEP, ARR, ODD = ONES + 6, ONES + 7, ONES + 8, ONES + 9, ONES + 10, ONES + 11
 LEFT, MIMA, SIZE, UNIT, SPEED, GUESS = (ONES + 12 + k for k in range(6))
 LAM, Q, TARGET, DIRECT, X, STEP = (ONES + 18 + k for k in range(6))
-LOOSE, OVER, OVER_UNIT, OVER_LEFT = (ONES + 24 + k for k in range(4))
+LOOSE, OVER = ONES + 24, ONES + 25
 # Direction of both positions and along the motion, and sizes.
-ARC = ONES + 28
+ARC = ONES + 26
 PATH = ARC + 18
 ROWS = PATH + 6 * MOST
 DUALS = ROWS + 13 * MOST
