@@ -232,8 +232,13 @@ class Legs:
         """(n,) whether a velocity may differ from the body's at one end or both."""
         return np.asarray((self.vinf_dep > 0.0) | (self.vinf_arr > 0.0))
 
-    def take(self, rows: ArrayLike) -> Self:
-        """Return the legs at the given rows (indices or a boolean mask), in that order."""
+    def take(self, rows: ArrayLike | slice) -> Self:
+        """Return the legs at the given rows (indices or a boolean mask), in that order.
+
+        Those of a slice share memory with these legs.
+        """
+        if isinstance(rows, slice):
+            return self._trusted({name: column[rows] for name, column in self._columns()})
         index = np.asarray(rows)
         if index.size == 0:
             index = index.astype(np.intp)

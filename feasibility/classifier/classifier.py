@@ -242,7 +242,7 @@ class FeasibilityClassifier:
         if self._free_positive is not None:
             rows = FREE_ENDS.rows_of(legs)
             of_kind = self._free_positive[:, _below(recall, self._free_positive.shape[1])]
-            found[rows] = of_kind[FREE_ENDS.kinds_of(legs.take(rows))]
+            found[rows] = of_kind[FREE_ENDS.kinds_of(legs)[rows]]
         return found
 
     def _margin_estimator(self) -> MarginEstimator:

@@ -25,5 +25,25 @@ def _float_of(typing_context: Any, value: Any) -> Any:  # noqa: ARG001 (numba's 
     return types.float64(types.int64), cast
 
 
+def _bits_of_single(typing_context: Any, value: Any) -> Any:  # noqa: ARG001 (numba's signature)
+    """Return the bits of a float in single precision as an integer."""
+
+    def cast(context: Any, builder: Any, signature: Any, args: Any) -> Any:  # noqa: ARG001
+        return builder.bitcast(args[0], ir.IntType(32))
+
+    return types.int32(types.float32), cast
+
+
+def _single_of(typing_context: Any, value: Any) -> Any:  # noqa: ARG001 (numba's signature)
+    """Return the float in single precision that has an integer's last 32 bits."""
+
+    def cast(context: Any, builder: Any, signature: Any, args: Any) -> Any:  # noqa: ARG001
+        return builder.bitcast(builder.trunc(args[0], ir.IntType(32)), ir.FloatType())
+
+    return types.float32(types.int64), cast
+
+
 bits_of: Final[Any] = intrinsic(_bits_of)
 float_of: Final[Any] = intrinsic(_float_of)
+bits_of_single: Final[Any] = intrinsic(_bits_of_single)
+single_of: Final[Any] = intrinsic(_single_of)

@@ -235,6 +235,8 @@ def test_rows_are_taken_in_the_order_asked_repeats_included(legs, data):
     mask = np.array(data.draw(st.lists(st.booleans(), min_size=len(legs), max_size=len(legs))))
     mask = mask.astype(bool)
     assert_same(legs.take(mask), legs.take(np.flatnonzero(mask)))
+    first = data.draw(st.integers(0, len(legs)))
+    assert_same(legs.take(slice(first, None)), legs.take(np.arange(first, len(legs))))
 
 
 @given(some_legs(), st.floats(1000.0, 5000.0))

@@ -19,8 +19,12 @@ from feasibility.legs import Legs
 _Array = NDArray[np.float64]
 _Rows = NDArray[np.intp]
 
-_LEGS_AT_A_TIME: Final = 4096
-"""Legs whose features are in the processor's cache at a time; the work of one thread."""
+_SETTLED_AT_A_TIME: Final = 2048
+"""Legs of which the quick net settles most; the work of one thread at a time."""
+
+_LOOKED_AT_A_TIME: Final = 256
+"""Legs for the large net, twenty times as much work each: a thread must not be left with a large
+block at the end while the others have nothing to do. As many as the nets multiply at a time."""
 
 
 @final
@@ -72,8 +76,9 @@ class MarginEstimator:
 
         def ask(nets: ViewNets, asked: _Rows) -> None:
             def settle(rows: _Rows) -> None:
-                probability[rows], inside[rows], known[rows], open_[rows] = nets.settle(
-                    legs.take(rows)
+                part = _neighbours(rows)
+                probability[part], inside[part], known[part], open_[part] = nets.settle(
+                    legs.take(part)
                 )
 
             def look(rows: _Rows) -> None:
@@ -81,8 +86,8 @@ class MarginEstimator:
                 # By the quick features wherever they exist, as the mass must not decide which.
                 inside[rows] = np.where(known[rows], inside[rows], near)
 
-            _in_blocks(settle, asked, threads)
-            _in_blocks(look, asked[open_[asked]], threads)
+            _in_blocks(settle, asked, _SETTLED_AT_A_TIME, threads)
+            _in_blocks(look, asked[open_[asked]], _LOOKED_AT_A_TIME, threads)
 
         for nets, rows in self._asked(legs):
             ask(nets, rows)
@@ -136,11 +141,15 @@ class MarginEstimator:
         return [(self._rendezvous, np.flatnonzero(~free)), (self._free, np.flatnonzero(free))]
 
 
-def _in_blocks(work: Callable[[_Rows], None], rows: _Rows, threads: int) -> None:
+def _neighbours(rows: _Rows) -> slice | _Rows:
+    """Return ascending rows as a slice where none is left out: nothing has to be copied then."""
+    first, last = int(rows[0]), int(rows[-1])
+    return slice(first, last + 1) if last - first + 1 == len(rows) else rows
+
+
+def _in_blocks(work: Callable[[_Rows], None], rows: _Rows, size: int, threads: int) -> None:
     """Do the work on blocks of rows; numpy and the kernels let other threads run meanwhile."""
-    blocks = [
-        rows[first : first + _LEGS_AT_A_TIME] for first in range(0, len(rows), _LEGS_AT_A_TIME)
-    ]
+    blocks = [rows[first : first + size] for first in range(0, len(rows), size)]
     if threads == 1 or len(blocks) < 2:
         for block in blocks:
             work(block)

@@ -389,9 +389,9 @@ def refine(
         z[j] = value
     for k in range(1, _N_ROUNDS + 1):
         flown_path(x0, rows, weights, g, tof, N_NODES, flown)
-        for i in range(N_NODES):
-            for j in range(6):
-                path[j * STRIDE + i] += _DAMPING * (flown[j * STRIDE + i] - path[j * STRIDE + i])
+        for j in range(6):
+            for i in range(j * STRIDE, j * STRIDE + N_NODES):
+                path[i] += _DAMPING * (flown[i] - path[i])
         if not gauss_rows(path, tof, N_NODES, rows, anomaly):
             return True
         value = smallest_impulse(rows, d, ve, value, N_NODES, int(_NEXT_STEPS), p, weights, g, c)

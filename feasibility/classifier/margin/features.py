@@ -138,7 +138,7 @@ def log_acceleration(legs: Legs, mass: _Array) -> _Array:
 def domain_quantities(X: _Array) -> _Array:
     """Return `DOMAIN_QUANTITIES` (n, 8) of features (n, k): of all or of the quick ones."""
     column = {name: X[:, i] for i, name in enumerate(QUICK_FEATURES[: len(_GEOMETRY)])}
-    return np.column_stack(
+    return np.stack(
         [
             column["log_tof"],
             column["log_exhaust_velocity"],
@@ -149,7 +149,7 @@ def domain_quantities(X: _Array) -> _Array:
             column["turns"],
             X[:, QUICK_FEATURES.index("log_impulse")],
         ]
-    )
+    ).T
 
 
 def _length(x: _Array, y: _Array) -> _Array:

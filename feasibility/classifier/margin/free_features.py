@@ -132,7 +132,7 @@ def free_domain_quantities(X: _Array) -> _Array:
     """Return `FREE_DOMAIN_QUANTITIES` (n, 10) of features (n, k): of all or of the quick ones."""
     names = FREE_FEATURES if X.shape[1] == len(FREE_FEATURES) else FREE_QUICK_FEATURES
     bounds = X[:, [names.index("bound_dep"), names.index("bound_arr")]]
-    return np.column_stack([domain_quantities(X), bounds])
+    return np.vstack([domain_quantities(X).T, bounds.T]).T
 
 
 def _arguments(legs: Legs) -> tuple[_Array, _Array, _Array, _Array, _Array, float]:

@@ -84,6 +84,9 @@ _SLOWEST = 0.3
 _FIRST_STEPS = 3
 _NEXT_STEPS = 2
 _NEEDED_ROUNDS = 2
+_CONVERGED = 1e-5
+_NEARLY_CONVERGED = 1e-3
+_ALIKE = 1e-3
 
 
 @inner_kernel
@@ -256,14 +259,28 @@ def lay_rows(tof: float, segments: int, path_work: PathWork) -> bool:
 
 
 @inner_kernel
+def bound(s: _Array, excess: _Array) -> bool:
+    """Return whether a body with an excess velocity is on an ellipse."""
+    speed2 = (s[3] + excess[0]) ** 2 + (s[4] + excess[1]) ** 2 + (s[5] + excess[2]) ** 2
+    return bool(2.0 / math.sqrt(s[0] * s[0] + s[1] * s[1] + s[2] * s[2]) - speed2 > 1e-6)
+
+
+@inner_kernel
+def lay_departure(s0: _Array, ends: _Array, elements: _Array) -> bool:
+    """Write the departure with its excess and its elements; return False off the ellipses."""
+    for j in range(3):
+        ends[0, j] = s0[j]
+        ends[0, 3 + j] = s0[3 + j] + ends[2, j]
+    return to_elements(ends[0], elements[0])
+
+
+@inner_kernel
 def lay_ends(s0: _Array, s1: _Array, ends: _Array, elements: _Array) -> bool:
     """Write the states with excess and their elements; return False off the ellipses."""
     for j in range(3):
-        ends[0, j] = s0[j]
         ends[1, j] = s1[j]
-        ends[0, 3 + j] = s0[3 + j] + ends[2, j]
         ends[1, 3 + j] = s1[3 + j] + ends[3, j]
-    return to_elements(ends[0], elements[0]) and to_elements(ends[1], elements[1])
+    return lay_departure(s0, ends, elements) and to_elements(ends[1], elements[1])
 
 
 @inner_kernel
@@ -440,7 +457,8 @@ def pursue(
     """Return z after ROUNDS rounds from the q-th start, with the excess velocities in `ends`.
 
     SATURATED where it has no path or leaves the ellipses; sooner where it lags behind `rival`,
-    the best z so far. `z_rounds` holds the z of each round.
+    the best z so far, comes to the same path as that one, or has converged. `z_rounds` holds the
+    z of each round.
     """
     path_work, ends, elements, flown, _, _, _, over, z_rounds, _, _, _ = work
     path, rows, p, weights, g, c, _, _ = path_work
@@ -460,11 +478,17 @@ def pursue(
     for k in range(1, ROUNDS + 1):
         if z > lag(k) * rival:
             return z
+        if k > _NEEDED_ROUNDS:
+            change = abs(z - z_rounds[k - 2])
+            if change < _CONVERGED * z:
+                break
+            if change < _NEARLY_CONVERGED * z and abs(z - rival) < _ALIKE * rival:
+                return max(z, rival)
         read_excess(int(0), dep, s0, int(SEGMENTS), work)
         read_excess(int(1), arr, s1, int(SEGMENTS), work)
         for j in range(6):
             before[0, j], before[1, j] = ends[0, j], ends[1, j]
-        bound_path = lay_ends(s0, s1, ends, elements)
+        bound_path = bound(s1, ends[3]) and lay_departure(s0, ends, elements)
         if bound_path:
             flown_path(elements[0], rows, weights, g, tof, int(SEGMENTS), flown)
         move_part(s0, before[0], ends[2])
@@ -476,9 +500,9 @@ def pursue(
         last = SEGMENTS - 1
         longitude = flown[5 * STRIDE + last] + 0.5 * tof / SEGMENTS * flown[last]
         elements[1, 5] += _TWO_PI * np.rint((longitude - elements[1, 5]) / _TWO_PI)
-        for i in range(SEGMENTS):
-            for j in range(6):
-                path[j * STRIDE + i] += _DAMPING * (flown[j * STRIDE + i] - path[j * STRIDE + i])
+        for j in range(6):
+            for i in range(j * STRIDE, j * STRIDE + SEGMENTS):
+                path[i] += _DAMPING * (flown[i] - path[i])
         if not lay_problem(tof, dep, arr, int(SEGMENTS), ends, elements, path_work):
             return z if k > _NEEDED_ROUNDS else SATURATED
         duals(rows, p, _NODES, g)

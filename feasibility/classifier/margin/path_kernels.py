@@ -267,24 +267,28 @@ def weighted_solve(rows: _Array, weights: _Array, d: _Array, nodes: int, p: _Arr
             )
             + l2 * rows[12 * STRIDE + i]
         )
-    # Cholesky's factors, written out; n is bound up with neither h nor k.
-    i0 = 1.0 / math.sqrt(g00)
+    # L D L^T, written out, as roots would be waited for; n is bound up with neither h nor k.
+    i0 = 1.0 / g00
     l10, l20, l50 = g01 * i0, g02 * i0, g05 * i0
-    rest1 = g11 - l10 * l10
-    i1 = 1.0 / math.sqrt(rest1)
-    l21, l31, l41, l51 = (g12 - l20 * l10) * i1, g13 * i1, g14 * i1, (g15 - l50 * l10) * i1
-    rest2 = g22 - l20 * l20 - l21 * l21
-    i2 = 1.0 / math.sqrt(rest2)
-    l32, l42 = (g23 - l31 * l21) * i2, (g24 - l41 * l21) * i2
-    l52 = (g25 - l50 * l20 - l51 * l21) * i2
-    rest3 = g33 - l31 * l31 - l32 * l32
-    i3 = 1.0 / math.sqrt(rest3)
-    l43, l53 = (g34 - l41 * l31 - l42 * l32) * i3, (g35 - l51 * l31 - l52 * l32) * i3
-    rest4 = g44 - l41 * l41 - l42 * l42 - l43 * l43
-    i4 = 1.0 / math.sqrt(rest4)
-    l54 = (g45 - l51 * l41 - l52 * l42 - l53 * l43) * i4
-    rest5 = g55 - l50 * l50 - l51 * l51 - l52 * l52 - l53 * l53 - l54 * l54
-    i5 = 1.0 / math.sqrt(rest5)
+    rest1 = g11 - l10 * g01
+    i1 = 1.0 / rest1
+    m21, m51 = g12 - l20 * g01, g15 - l50 * g01
+    l21, l31, l41, l51 = m21 * i1, g13 * i1, g14 * i1, m51 * i1
+    rest2 = g22 - l20 * g02 - l21 * m21
+    i2 = 1.0 / rest2
+    m32, m42 = g23 - l31 * m21, g24 - l41 * m21
+    m52 = g25 - l50 * g02 - l51 * m21
+    l32, l42, l52 = m32 * i2, m42 * i2, m52 * i2
+    rest3 = g33 - l31 * g13 - l32 * m32
+    i3 = 1.0 / rest3
+    m43, m53 = g34 - l41 * g13 - l42 * m32, g35 - l51 * g13 - l52 * m32
+    l43, l53 = m43 * i3, m53 * i3
+    rest4 = g44 - l41 * g14 - l42 * m42 - l43 * m43
+    i4 = 1.0 / rest4
+    m54 = g45 - l51 * g14 - l52 * m42 - l53 * m43
+    l54 = m54 * i4
+    rest5 = g55 - l50 * g05 - l51 * m51 - l52 * m52 - l53 * m53 - l54 * m54
+    i5 = 1.0 / rest5
     if not (
         g00 > 0.0
         and rest1 > _SINGULAR * g11
@@ -294,17 +298,17 @@ def weighted_solve(rows: _Array, weights: _Array, d: _Array, nodes: int, p: _Arr
         and rest5 > _SINGULAR * g55
     ):
         return False
-    p0 = d[0] * i0
-    p1 = (d[1] - l10 * p0) * i1
-    p2 = (d[2] - l20 * p0 - l21 * p1) * i2
-    p3 = (d[3] - l31 * p1 - l32 * p2) * i3
-    p4 = (d[4] - l41 * p1 - l42 * p2 - l43 * p3) * i4
-    p5 = (d[5] - l50 * p0 - l51 * p1 - l52 * p2 - l53 * p3 - l54 * p4) * i5 * i5
-    p4 = (p4 - l54 * p5) * i4
-    p3 = (p3 - l43 * p4 - l53 * p5) * i3
-    p2 = (p2 - l32 * p3 - l42 * p4 - l52 * p5) * i2
-    p1 = (p1 - l21 * p2 - l31 * p3 - l41 * p4 - l51 * p5) * i1
-    p0 = (p0 - l10 * p1 - l20 * p2 - l50 * p5) * i0
+    p0 = d[0]
+    p1 = d[1] - l10 * p0
+    p2 = d[2] - l20 * p0 - l21 * p1
+    p3 = d[3] - l31 * p1 - l32 * p2
+    p4 = d[4] - l41 * p1 - l42 * p2 - l43 * p3
+    p5 = (d[5] - l50 * p0 - l51 * p1 - l52 * p2 - l53 * p3 - l54 * p4) * i5
+    p4 = p4 * i4 - l54 * p5
+    p3 = p3 * i3 - l43 * p4 - l53 * p5
+    p2 = p2 * i2 - l32 * p3 - l42 * p4 - l52 * p5
+    p1 = p1 * i1 - l21 * p2 - l31 * p3 - l41 * p4 - l51 * p5
+    p0 = p0 * i0 - l10 * p1 - l20 * p2 - l50 * p5
     p[0], p[1], p[2], p[3], p[4], p[5] = p0, p1, p2, p3, p4, p5
     return True
 

@@ -83,18 +83,16 @@ class ViewNets:
         kinds = self._kinds(legs)
         known = np.isfinite(hint)
         probability = np.full(len(legs), CERTAIN)
-        inside = np.zeros(len(legs), dtype=np.bool_)
-        if not known.all():
-            rows = np.flatnonzero(known)
-            inside[rows] = self._inside(X[rows], _some(kinds, rows))
-        else:
-            rows = np.arange(len(legs))
-            inside = self._inside(X, kinds)
+        inside = known & self._inside(X, kinds)
         excess = self._view.log_acceleration(legs, legs.m0) - hint
-        for net, settled in self._settling:
+        rows = np.flatnonzero(known)
+        for number, (net, settled) in enumerate(self._settling):
             if not len(rows):
                 break
-            correction, error = net(X if len(rows) == len(X) else X[rows])
+            # The first one is asked about all, as a copy of most costs more than a few in vain.
+            correction, error = net(X if number == 0 else X[rows])
+            if number == 0 and len(rows) < len(X):
+                correction, error = correction[rows], error[rows]
             ratio = (excess[rows] - correction) / error
             low, high = settled[0 if kinds is None else kinds[rows]].T
             feasible = ratio > -low
@@ -178,8 +176,12 @@ class ViewNets:
         return self._view.kinds_of(legs) if self._view.kinds else None
 
     def _inside(self, X: _Array, kinds: NDArray[np.intp] | None) -> NDArray[np.bool_]:
-        quantities = self._view.domain_quantities(X)
-        inside = ((self._low <= quantities) & (quantities <= self._high)).all(axis=1)
+        inside = np.ones(len(X), dtype=np.bool_)
+        # One after the other: three times as fast as all rows at once.
+        for low, high, values in zip(
+            self._low, self._high, self._view.domain_quantities(X).T, strict=True
+        ):
+            inside &= (low <= values) & (values <= high)
         return np.asarray(inside if kinds is None else inside & self._known_kinds[kinds])
 
 
