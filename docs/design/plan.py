@@ -13,6 +13,7 @@ FLOORS = {
         {"runs": "run folder, checkpoints, sessions, resuming, fleets"},
         {"carriers": "a mother ship and the tours of her craft, together"},
         {"beam": "the search: passes, ranks, expanders, frontiers, rankings, scouting"},
+        {"chart": "legs between near bodies, looked up"},
         {"polish": "all epochs of a tour at once", "refine": "continuous thrust"},
         {"problems": "one folder a problem, found by entry points; problem files"},
         {"pruning": "pruners by name, pruning of hops, the audit"},

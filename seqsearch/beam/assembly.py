@@ -22,6 +22,7 @@ from seqsearch.beam.pacing import ClockPacing, FixedPacing, Pacing
 from seqsearch.beam.passes import Passes
 from seqsearch.beam.rankings.make import make_ranking
 from seqsearch.beam.rankings.protocol import Ranking
+from seqsearch.beam.scouting.charted import ChartedPasses, chart_fits
 from seqsearch.beam.scouting.generations import NoScouting, ScoutedPasses, Scouting
 from seqsearch.beam.scouting.guide import Guide, guide_to
 from seqsearch.beam.scouting.scouts import Scouts
@@ -31,6 +32,7 @@ from seqsearch.budget import Budget
 from seqsearch.core.optimisation import LegOptimiser
 from seqsearch.core.possible import check_possible
 from seqsearch.core.problem import Problem
+from seqsearch.problems.rendezvous import RendezvousProblem
 from seqsearch.pruning.pruner_spec import parse_pruner, predictor_of
 from seqsearch.settings import SearchSettings
 
@@ -185,6 +187,19 @@ def assemble(
     if predictor is not None and own.none and _scouts_fit(problem, settings, timed=timed):
         scouts = Scouts(problem, predictor, settings, executor)
         scouting = ScoutedPasses(scouts, pacing, budget, threads)
+        if isinstance(problem, RendezvousProblem) and chart_fits(
+            problem, settings, budget, threads
+        ):
+            scouting = ChartedPasses(
+                scouting,
+                problem,
+                predictor,
+                settings,
+                best=best,
+                budget=budget,
+                executor=executor,
+                threads=threads,
+            )
     passes = Passes(
         problem,
         settings.passes,

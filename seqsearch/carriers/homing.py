@@ -11,9 +11,10 @@ from typing import Final, final
 import numpy as np
 from numpy.typing import NDArray
 
-from seqsearch.carriers.beam_ranks import Children, Rank
-from seqsearch.carriers.chart_kernels import choose, expand
+from seqsearch.carriers.chart_kernels import expand
 from seqsearch.carriers.leg_chart import STEP_DAYS, TOF_DAYS, ChartMaker, LegChart, Ways
+from seqsearch.chart.choice_kernels import choose
+from seqsearch.chart.ranks import Children, Rank
 from seqsearch.core.nodes import Nodes
 from seqsearch.polish.itinerary import Itinerary
 from seqsearch.problems.rendezvous import RendezvousProblem

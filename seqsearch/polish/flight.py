@@ -90,6 +90,10 @@ class Flight:
     def to_tour(self, problem: Problem) -> Tour:
         """Return the tour; the flight has to keep the rules."""
         tree = SearchTree()
+        return record_tour(problem, tree, self.planted(problem, tree))
+
+    def planted(self, problem: Problem, tree: SearchTree) -> int:
+        """Add the flight to a search tree and return its last node; it has to keep the rules."""
         itinerary = self.itinerary
         legs = itinerary.legs(problem, problem.m0)
         node = tree.add_start(
@@ -111,7 +115,7 @@ class Flight:
                 mismatch=float(self.solutions.mismatch[k]),
             )
             node = tree.add_hop(node, (leg,))
-        return record_tour(problem, tree, node)
+        return node
 
 
 @final

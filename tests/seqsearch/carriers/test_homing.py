@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from feasibility import Legs
-from seqsearch.carriers.chart_kernels import choose
 from seqsearch.carriers.homing import Homing, HomingSettings
+from seqsearch.chart.choice_kernels import choose
 from seqsearch.core.nodes import Nodes
 from tests.helpers.charts import DURATION_DAYS, M0, T0, charted
 
