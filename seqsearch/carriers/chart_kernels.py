@@ -1,9 +1,8 @@
 """A beam of predicted legs over a chart: everything is looked up, nothing is solved.
 
-With n bodies, intervals of epochs, and q flight times. A curve is log(m*) in kg over the
-logarithm of the flight time; between its q points, and between the two ends of an interval of
-epochs, it is linear. So are the velocity changes of Lambert arcs. Both are stored as integers of
-16 bits.
+With n bodies, intervals of epochs, and q flight times. Curves are those of
+`seqsearch.chart.curve_kernels`: what is stored is 1/m* and the velocity change of the Lambert arc,
+at three departures of an interval.
 """
 
 import math
@@ -12,100 +11,80 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.runtime.jit import inner_kernel, kernel
+from seqsearch.chart.curve_kernels import (
+    NEVER,
+    mass_after,
+    shortest_flight,
+    squares,
+    value_at,
+)
 
 _Codes = NDArray[np.uint16]
 _Array = NDArray[np.float64]
 _Index = NDArray[np.int32]
 
 Chart = tuple[NDArray[np.int64], _Index, _Codes, _Codes, _Array]
-"""Offsets, targets, m*, velocity changes, logarithms of flight times, as `LegChart` has them."""
+"""Offsets, targets, 1/m*, velocity changes, logarithms of flight times, as `LegChart` has them."""
 
 Grid = tuple[float, float, int]
 """Where the first interval begins, how long each is, how many there are."""
 
 Home = tuple[int, _Index, _Codes, _Codes, _Array]
-"""First interval, index, m*, velocity changes and logarithms of flight times of `Ways`."""
+"""First interval, index, 1/m*, velocity changes and logarithms of flight times of `Ways`."""
 
 Craft = tuple[float, float, float, float, float]
 """Dry and first mass (kg), thrust (N), exhaust velocity (m/s), reserve in log(m*)."""
 
-BURN_A = 4.18
-BURN_B = 0.82
-"""Of `feasibility.classifier.predictor.bounded_final_mass`."""
-
-LOG_MASS_LOW = 5.0
-LOG_MASS_UNIT = 6.0 / 65535.0
-SPEED_UNIT = 0.2
-"""log(m*/kg) and m/s of codes: the first is LOG_MASS_LOW + LOG_MASS_UNIT times the code."""
+Work = tuple[_Array, _Array, _Array]
+"""Room for both curves of a leg, and for four differences."""
 
 HOME_TRIALS = 6
 HOME_STRETCH = 0.12
 """Flights to the end that are tried: by how much each is longer, in the logarithm."""
 
-NEVER = 1e9
 _LEAST = 1e-6
 
 
 @inner_kernel
-def _on(values: _Codes, share: float, q: int) -> float:
-    """Return a code between the two ends of an interval of epochs."""
-    return float(values[0, q]) * (1.0 - share) + float(values[1, q]) * share
-
-
-@kernel
-def shortest_flight(values: _Codes, share: float, log_tof: _Array, level: float) -> float:
-    """Return the logarithm of the flight time at which a curve reaches a level; NEVER for none."""
-    code = (level - LOG_MASS_LOW) / LOG_MASS_UNIT
-    before = _on(values, share, 0)
-    if before >= code:
-        first: float = log_tof[0]
-        return first
-    for q in range(1, len(log_tof)):
-        here = _on(values, share, q)
-        if here >= code:
-            part = (code - before) / (here - before)
-            found: float = log_tof[q - 1] + part * (log_tof[q] - log_tof[q - 1])
-            return found
-        before = here
-    return NEVER
-
-
-@kernel
-def value_at(values: _Codes, share: float, log_tof: _Array, at: float) -> float:
-    """Return the code of a curve at the logarithm of a flight time, held at its ends."""
-    last = len(log_tof) - 1
-    if at <= log_tof[0]:
-        return _on(values, share, 0)
-    for q in range(1, last + 1):
-        if at <= log_tof[q]:
-            part = (at - log_tof[q - 1]) / (log_tof[q] - log_tof[q - 1])
-            before = _on(values, share, q - 1)
-            found: float = before + part * (_on(values, share, q) - before)
-            return found
-    return _on(values, share, last)
-
-
-@kernel
-def mass_after(
-    mass: float, m_code: float, v_code: float, tof_s: float, thrust: float, exhaust: float
+def _looked_up(
+    inverse: _Codes,
+    speed: _Codes,
+    share: float,
+    units: tuple[float, float],
+    x: _Array,
+    level: float,
+    work: Work,
 ) -> float:
-    """Return the mass at arrival, as `bounded_final_mass` estimates it."""
-    log_m_star = LOG_MASS_LOW + LOG_MASS_UNIT * m_code
-    delta_v = SPEED_UNIT * v_code
-    beyond = max(math.exp(log_m_star) / mass - 1.0, 0.0)
-    most = thrust / exhaust * tof_s / (1.0 + beyond)
-    least = min(mass * (1.0 - math.exp(-delta_v / exhaust)), most)
-    more: float = (most - least) / (1.0 + BURN_A * beyond**BURN_B)
-    return mass - least - more
+    """Write both curves of a leg; return its shortest flight for a log(m*), NEVER for none."""
+    y, v, differences = work
+    squares(inverse, share, units[0], y)
+    if y.min() > math.exp(-2.0 * level):
+        return NEVER
+    for q in range(len(x)):
+        y[q] = -0.5 * math.log(y[q])
+    shortest: float = shortest_flight(x, y, level, differences)
+    if shortest < NEVER:
+        squares(speed, share, units[1], v)
+        for q in range(len(x)):
+            v[q] = math.sqrt(v[q])
+    return shortest
 
 
 @inner_kernel
 def home_days(
-    ready: float, mass: float, row: int, left: float, grid: Grid, home: Home, craft: Craft
+    ready: float,
+    mass: float,
+    row: int,
+    left: float,
+    grid: Grid,
+    home: Home,
+    units: tuple[float, float],
+    craft: Craft,
+    work: Work,
 ) -> float:
     """Return the shortest flight to the end; NEVER where there is none."""
     t0, step, _ = grid
-    first, index, m_star, delta_v, log_tof = home
+    first, index, inverse, speed, log_tof = home
     m_dry, _, thrust, exhaust, reserve = craft
     place = (ready - t0) / step
     k = math.floor(place) - first
@@ -115,7 +94,8 @@ def home_days(
     if h < 0:
         return NEVER
     share = place - math.floor(place)
-    least = shortest_flight(m_star[h], share, log_tof, math.log(mass) + reserve)
+    level = math.log(mass) + reserve
+    least = _looked_up(inverse[h], speed[h], share, units, log_tof, level, work)
     if least >= NEVER:
         return NEVER
     last = min(math.log(max(left, 1.0)), log_tof[-1])
@@ -129,8 +109,8 @@ def home_days(
         days = math.exp(at)
         after = mass_after(
             mass,
-            value_at(m_star[h], share, log_tof, at),
-            value_at(delta_v[h], share, log_tof, at),
+            value_at(log_tof, work[0], at, work[2]),
+            value_at(log_tof, work[1], at, work[2]),
             days * 86400.0,
             thrust,
             exhaust,
@@ -156,6 +136,7 @@ def expand(
     own: _Index,
     closed: NDArray[np.bool_],
     chart: Chart,
+    units: tuple[float, float],
     grid: Grid,
     home: Home,
     distance: tuple[int, NDArray[np.float32]],
@@ -168,20 +149,22 @@ def expand(
     """Write all children of a rank and return how many; as many as there is room for.
 
     `nodes` are rows, epochs from which they are ready, first departures and masses; `own` their
-    bodies. `limits` are the longest duration, the stay, the longest flight (days), and the shares
-    of the duration after which a way home is looked for, and has to be there. `weights` are those
-    of the propellant and of the distance from the end, which `distance` has from an interval on.
-    `out` gets rows, parents, arrivals, masses, scores
-    and durations of tours that go to the end from there.
+    bodies. `units` are those of 1/m* and of velocity changes. `limits` are the longest duration,
+    the stay, the longest flight (days), and the shares of the duration after which a way home is
+    looked for, and has to be there. `weights` are those of the propellant and of the distance from
+    the end, which `distance` has from an interval on. `out` gets rows, parents, arrivals, masses,
+    scores and durations of tours that go to the end from there.
     """
     row, ready, first, mass = nodes
-    offsets, target, m_star, delta_v, log_tof = chart
+    offsets, target, inverse, speed, log_tof = chart
     t0, step, intervals = grid
     duration, stay, longest, homeward, must = limits
     m_dry, m_first, thrust, exhaust, reserve = craft
     w_mass, w_distance = weights
     out_row, out_parent, out_arrival, out_mass, out_score, out_home = out
     total = 1.0 + w_mass
+    work = np.empty(len(log_tof)), np.empty(len(log_tof)), np.empty(4)
+    home_work = np.empty(len(home[4])), np.empty(len(home[4])), np.empty(4)
     count = 0
     for i in range(len(row)):
         place = (ready[i] - t0) / step
@@ -197,7 +180,9 @@ def expand(
             j = target[p]
             if closed[j] or _is_among(own[i], j):
                 continue
-            least = shortest_flight(m_star[p], share, log_tof, level)
+            least = _looked_up(inverse[p], speed[p], share, units, log_tof, level, work)
+            if least >= NEVER:
+                continue
             for stretch in stretches:
                 at = least + stretch
                 if at > log_tof[-1]:
@@ -209,8 +194,8 @@ def expand(
                     break
                 after = mass_after(
                     mass[i],
-                    value_at(m_star[p], share, log_tof, at),
-                    value_at(delta_v[p], share, log_tof, at),
+                    value_at(log_tof, work[0], at, work[2]),
+                    value_at(log_tof, work[1], at, work[2]),
                     tof * 86400.0,
                     thrust,
                     exhaust,
@@ -221,7 +206,10 @@ def expand(
                 days = NEVER
                 if part > homeward:
                     left = duration - elapsed - stay
-                    days = home_days(arrival + stay, after, j, left, grid, home, craft)
+                    days = home_days(
+                        *(arrival + stay, after, j, left),
+                        *(grid, home, units, craft, home_work),
+                    )
                     if days > left and part > must:
                         continue
                 time_left = max(1.0 - part, _LEAST)

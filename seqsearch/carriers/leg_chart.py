@@ -1,8 +1,9 @@
 """`LegChart`: what a classifier says of all legs between near bodies, at all epochs.
 
-m* does not depend on the mass at departure. So the curve of log(m*) over the flight time, for a
-pair of bodies and a departure, serves spacecraft of any mass, and beams that look everything up
-are hundreds of times as fast as those that ask the classifier.
+m* does not depend on the mass at departure. So the curve of m* over the flight time, for a pair of
+bodies and a departure, serves spacecraft of any mass, and beams that look everything up are
+hundreds of times as fast as those that ask the classifier. What is stored is what
+`seqsearch.chart.curves` describes.
 """
 
 from dataclasses import dataclass
@@ -18,7 +19,7 @@ from feasibility.legs import Spacecraft
 from feasibility.orbits import Catalogue
 from feasibility.orbits.lambert import lambert_delta_v
 from feasibility.orbits.neighbours import orbital_metric
-from seqsearch.carriers.chart_kernels import LOG_MASS_LOW, LOG_MASS_UNIT, SPEED_UNIT
+from seqsearch.chart.curves import MAX_CODE, N_EPOCHS, SPEED_UNIT, inverse_unit
 from seqsearch.core.hop_margins import quick_margin_of
 
 _Array = NDArray[np.float64]
@@ -28,7 +29,7 @@ _Index = NDArray[np.intp]
 
 TOF_DAYS: Final = np.array([70.0, 100.0, 140.0, 185.0, 240.0])
 HOME_TOF_DAYS: Final = np.array([50.0, 80.0, 120.0, 180.0, 270.0, 400.0])
-"""Flight times between which curves are linear: of all legs, and of those to the end."""
+"""Flight times of the curves: of all legs, and of those to the end."""
 
 STEP_DAYS: Final = 80.0
 """Length of the intervals of departures."""
@@ -47,8 +48,6 @@ _HOME_FARTHEST: Final = 5500.0
 _HOME_MOST: Final = 120
 """Bodies from which there may be a way to an end."""
 
-_MAX_CODE: Final = 65535
-
 
 @final
 @dataclass(frozen=True, eq=False)
@@ -65,7 +64,7 @@ class Ways:
         The first interval.
     index : (k, n) int32
         Which curve a body has in an interval; -1 for none.
-    m_star, delta_v : (h, 2, q) uint16
+    inverse, speed : (h, 3, q) uint16
         As those of `LegChart`.
     log_tof : (q,) float64
         Logarithms of the flight times in days.
@@ -74,8 +73,8 @@ class Ways:
     end: int
     first: int
     index: _Rows
-    m_star: _Codes
-    delta_v: _Codes
+    inverse: _Codes
+    speed: _Codes
     log_tof: _Array
 
 
@@ -96,9 +95,9 @@ class LegChart:
         Pairs of body i in interval j are those from entry j n + i on.
     target : (p,) int32
         Where they lead, as positions in `rows`.
-    m_star, delta_v : (p, 2, q) uint16
-        log(m*/kg) and the velocity changes of Lambert arcs, at both ends of the interval and at
-        `TOF_DAYS`, in the units of `chart_kernels`.
+    inverse, speed : (p, 3, q) uint16
+        1/m* and the velocity changes of Lambert arcs, at the beginning, the middle and the end of
+        the interval and at `TOF_DAYS`, in units of `inverse_unit` and `SPEED_UNIT`.
     points : (k + 1, n, 6) float32, m/s
         The orbital metric at the ends of all intervals.
     source : (p,) int32
@@ -113,8 +112,8 @@ class LegChart:
     t0_mjd2000: float
     offsets: NDArray[np.int64]
     target: _Rows
-    m_star: _Codes
-    delta_v: _Codes
+    inverse: _Codes
+    speed: _Codes
     points: NDArray[np.float32]
     source: _Rows
     to: _Rows
@@ -132,8 +131,8 @@ class LegChart:
             t0_mjd2000=t0_mjd2000,
             offsets=np.concatenate([[0], np.cumsum(counts)]),
             target=target,
-            m_star=np.concatenate([part.m_star for part in inner]),
-            delta_v=np.concatenate([part.delta_v for part in inner]),
+            inverse=np.concatenate([part.inverse for part in inner]),
+            speed=np.concatenate([part.speed for part in inner]),
             points=np.array([part.points for part in parts]),
             source=np.repeat(np.arange(len(counts), dtype=np.int32), counts),
             to=to,
@@ -165,7 +164,7 @@ class LegChart:
         pairs = pairs[inside]
         index = np.full((last - first + 1, n), -1, dtype=np.int32)
         index[interval[inside] - first, body[inside]] = np.arange(len(pairs))
-        curves = np.asarray(self.m_star[pairs]), np.asarray(self.delta_v[pairs])
+        curves = np.asarray(self.inverse[pairs]), np.asarray(self.speed[pairs])
         return Ways(end, first, index, *curves, np.log(TOF_DAYS))
 
 
@@ -176,8 +175,8 @@ class ChartPart:
 
     counts: NDArray[np.int64]
     target: _Rows
-    m_star: _Codes
-    delta_v: _Codes
+    inverse: _Codes
+    speed: _Codes
     points: NDArray[np.float32]
 
 
@@ -213,6 +212,7 @@ class ChartMaker:
         self._catalogue, self._rows, self._craft = catalogue, rows, spacecraft
         self._ask = quick_margin_of(predictor)
         self._t0 = t0_mjd2000
+        self._unit = inverse_unit(spacecraft.m_dry)
         # Margins are best known for masses that legs have.
         self._mass = float(np.sqrt(m0 * spacecraft.m_dry))
 
@@ -227,8 +227,8 @@ class ChartMaker:
         different = source != target
         source, target = source[different], target[different]
         codes, _ = self._codes(source, target, begin + 0.5 * STEP_DAYS, TOF_DAYS[_ASKED])
-        enough = (np.log(_HEAVY_ENOUGH * self._craft.m_dry) - LOG_MASS_LOW) / LOG_MASS_UNIT
-        source, target = source[codes >= enough], target[codes >= enough]
+        enough = codes <= 1.0 / (_HEAVY_ENOUGH * self._craft.m_dry * self._unit)
+        source, target = source[enough], target[enough]
         curves = self._curves(source, target, begin, TOF_DAYS)
         counts = np.bincount(source, minlength=len(middle)).astype(np.int64)
         points = self._points(begin, _METRIC_DAYS).astype(np.float32)
@@ -259,21 +259,19 @@ class ChartMaker:
     def _curves(
         self, source: _Index, target: _Index, begin: _Array | float, tof_days: _Array
     ) -> tuple[_Codes, _Codes]:
-        """Return two (p, 2, q) curves, at both ends of an interval."""
-        m_star = np.empty((len(source), 2, len(tof_days)), dtype=np.uint16)
-        delta_v = np.empty_like(m_star)
-        for side in range(2):
+        """Return two (p, 3, q) curves of an interval."""
+        inverse = np.empty((len(source), N_EPOCHS, len(tof_days)), dtype=np.uint16)
+        speed = np.empty_like(inverse)
+        for k in range(N_EPOCHS):
+            departure = begin + k / (N_EPOCHS - 1) * STEP_DAYS
             for q, tof in enumerate(tof_days):
-                departure = begin + side * STEP_DAYS
-                m_star[:, side, q], delta_v[:, side, q] = self._codes(
-                    source, target, departure, tof
-                )
-        return m_star, delta_v
+                inverse[:, k, q], speed[:, k, q] = self._codes(source, target, departure, tof)
+        return inverse, speed
 
     def _codes(
         self, source: _Index, target: _Index, t_dep: _Array | float, tof: float
     ) -> tuple[_Codes, _Codes]:
-        """Return log(m*) and velocity changes of Lambert arcs as codes."""
+        """Return 1/m* and velocity changes of Lambert arcs as codes."""
         rows, craft = self._rows, self._craft
         legs = Legs(
             rv_dep=self._catalogue.states_at(rows[source], t_dep),
@@ -284,13 +282,12 @@ class ChartMaker:
             isp=craft.isp,
             m_dry=craft.m_dry,
         )
-        log_m_star = np.log(self._mass * np.maximum(self._ask(legs), 1e-9))
-        mass = (np.nan_to_num(log_m_star) - LOG_MASS_LOW) / LOG_MASS_UNIT
-        speed = (
-            np.nan_to_num(lambert_delta_v(legs.rv_dep, legs.rv_arr, legs.tof_s, 0)) / SPEED_UNIT
-        )
-        return _coded(mass), _coded(speed)
+        # A leg of which nothing is known counts as one that cannot be flown.
+        m_star = self._mass * np.maximum(np.nan_to_num(self._ask(legs)), 1e-9)
+        speed = lambert_delta_v(legs.rv_dep, legs.rv_arr, legs.tof_s, 0)
+        codes = _coded(1.0 / (m_star * self._unit))
+        return codes, _coded(np.nan_to_num(speed, nan=1e9) / SPEED_UNIT)
 
 
 def _coded(values: _Array) -> _Codes:
-    return np.clip(np.rint(values), 0, _MAX_CODE).astype(np.uint16)
+    return np.clip(np.rint(values), 0, MAX_CODE).astype(np.uint16)

@@ -2,7 +2,7 @@
 
 Over the departure epoch the squares of 1/m* and of velocity changes are parabolas through three
 points. Over the logarithm of the flight time, log(m*) and velocity changes are cubics through the
-four nearest of five points.
+four nearest points.
 """
 
 import math
@@ -73,8 +73,10 @@ def _cubic(x: _Array, d: _Array, k: int, at: float) -> float:
 
 @kernel
 def value_at(x: _Array, y: _Array, at: float, work: _Array) -> float:
-    """Return a curve of five points at the logarithm of a flight time."""
-    k = 0 if at < x[2] else 1
+    """Return a curve of four or more points at the logarithm of a flight time."""
+    k = 0
+    while k < len(x) - 4 and at >= x[k + 2]:
+        k += 1
     _differences(x, y, k, work)
     return _cubic(x, work, k, at)
 
@@ -88,7 +90,7 @@ def shortest_flight(x: _Array, y: _Array, level: float, work: _Array) -> float:
     for q in range(1, len(x)):
         if y[q] < level:
             continue
-        k = 0 if q <= 2 else 1
+        k = min(max(q - 2, 0), len(x) - 4)
         _differences(x, y, k, work)
         low, high = x[q - 1], x[q]
         below, above = y[q - 1] - level, y[q] - level

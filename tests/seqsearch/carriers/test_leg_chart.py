@@ -7,16 +7,9 @@ from feasibility import InputError
 from feasibility.classifier.predictor import bounded_final_mass
 from feasibility.orbits.lambert import lambert_delta_v
 from seqsearch.carriers.chart_files import has_chart, read_chart, write_chart
-from seqsearch.carriers.chart_kernels import (
-    LOG_MASS_LOW,
-    LOG_MASS_UNIT,
-    NEVER,
-    SPEED_UNIT,
-    mass_after,
-    shortest_flight,
-    value_at,
-)
 from seqsearch.carriers.leg_chart import HOME_TOF_DAYS, STEP_DAYS, TOF_DAYS
+from seqsearch.chart.curve_kernels import NEVER, mass_after, shortest_flight, squares, value_at
+from seqsearch.chart.curves import SPEED_UNIT, inverse_unit
 from tests.helpers.charts import CRAFT, M0, charted, known_legs
 
 
@@ -36,6 +29,20 @@ def _drawn(world, count, rng):
     return pairs, source, share, t_dep, tof
 
 
+def _masses(codes, share):
+    """Return log(m*) at all flight times."""
+    out = np.empty(codes.shape[1])
+    squares(codes, share, inverse_unit(CRAFT.m_dry), out)
+    return -0.5 * np.log(out)
+
+
+def _speeds(codes, share):
+    """Return the velocity changes at all flight times."""
+    out = np.empty(codes.shape[1])
+    squares(codes, share, SPEED_UNIT, out)
+    return np.sqrt(out)
+
+
 def test_looking_up_is_asking(world):
     chart, rng = world.chart, np.random.default_rng(1)
     pairs, source, share, t_dep, tof = _drawn(world, 400, rng)
@@ -43,24 +50,22 @@ def test_looking_up_is_asking(world):
     asked = np.log(world.predictor.quick_margin(legs) * M0)
     speed = lambert_delta_v(legs.rv_dep, legs.rv_arr, legs.tof_s, 0)
     log_tof = np.log(TOF_DAYS)
-    looked_up = LOG_MASS_LOW + LOG_MASS_UNIT * np.array(
-        [
-            value_at(chart.m_star[p], s, log_tof, np.log(t))
-            for p, s, t in zip(pairs, share, tof, strict=True)
-        ]
-    )
-    speeds = SPEED_UNIT * np.array(
-        [
-            value_at(chart.delta_v[p], s, log_tof, np.log(t))
-            for p, s, t in zip(pairs, share, tof, strict=True)
-        ]
+    looked_up, speeds = (
+        np.array(
+            [
+                value_at(log_tof, curve(codes[p], s), np.log(t), np.empty(4))
+                for p, s, t in zip(pairs, share, tof, strict=True)
+            ]
+        )
+        for curve, codes in ((_masses, chart.inverse), (_speeds, chart.speed))
     )
     flyable = (asked > np.log(700.0)) & (asked < np.log(4000.0))
     assert flyable.sum() > 100
-    error = np.abs(looked_up - asked)[flyable]
-    assert np.median(error) < 0.05
-    assert np.quantile(error, 0.8) < 0.15
-    assert np.median(np.abs(speeds / speed - 1.0)[flyable]) < 0.03
+    error = (looked_up - asked)[flyable]
+    assert abs(error.mean()) < 0.01
+    assert np.median(np.abs(error)) < 0.01
+    assert np.quantile(np.abs(error), 0.8) < 0.04
+    assert np.median(np.abs(speeds / speed - 1.0)[flyable]) < 0.01
 
 
 def test_the_shortest_flight_is_where_the_curve_reaches_the_level(world):
@@ -73,15 +78,14 @@ def test_the_shortest_flight_is_where_the_curve_reaches_the_level(world):
         np.log(rng.uniform(800.0, 2500.0, 300)),
         strict=True,
     ):
-        curve = chart.m_star[p]
-        at = shortest_flight(curve, share, log_tof, level)
-        code = (level - LOG_MASS_LOW) / LOG_MASS_UNIT
+        curve, work = _masses(chart.inverse[p], share), np.empty(4)
+        at = shortest_flight(log_tof, curve, level, work)
         if at == NEVER:
-            assert all(value_at(curve, share, log_tof, x) < code for x in log_tof)
+            assert (curve < level).all()
         elif at > log_tof[0]:
             reached += 1
-            assert value_at(curve, share, log_tof, at) == pytest.approx(code, abs=1e-6)
-            assert value_at(curve, share, log_tof, at - 1e-3) < code
+            assert value_at(log_tof, curve, at, work) == pytest.approx(level, abs=1e-3)
+            assert value_at(log_tof, curve, at - 1e-2, work) < level
     assert reached > 50
 
 
@@ -95,8 +99,8 @@ def test_the_mass_on_arrival_is_that_of_the_predictor(world):
     got = [
         mass_after(
             M0,
-            (np.log(M0 * margin[k]) - LOG_MASS_LOW) / LOG_MASS_UNIT,
-            speed[k] / SPEED_UNIT,
+            np.log(M0 * margin[k]),
+            speed[k],
             legs.tof_s[k],
             CRAFT.thrust,
             CRAFT.exhaust_velocity,
@@ -133,15 +137,12 @@ def test_thorough_ways_reach_farther_and_agree_where_both_know(world):
     near, far = chart.ways(end, 3, 5), world.maker.ways(end, 3, 5)
     both = (near.index >= 0) & (far.index >= 0)
     assert (far.index >= 0).sum() > 1.5 * both.sum() > 10
-    at = np.log(140.0)
-    codes = [
-        (
-            value_at(near.m_star[near.index[k, body]], 0.4, near.log_tof, at),
-            value_at(far.m_star[far.index[k, body]], 0.4, far.log_tof, at),
-        )
+    at, work = np.log(140.0), np.empty(4)
+    difference = [
+        value_at(near.log_tof, _masses(near.inverse[near.index[k, body]], 0.4), at, work)
+        - value_at(far.log_tof, _masses(far.inverse[far.index[k, body]], 0.4), at, work)
         for k, body in np.argwhere(both)
     ]
-    difference = LOG_MASS_UNIT * np.diff(np.array(codes), axis=1)
     assert np.median(np.abs(difference)) < 0.03
     assert far.log_tof[-1] == np.log(HOME_TOF_DAYS[-1])
 
@@ -153,13 +154,13 @@ def test_a_folder_gives_the_chart_back(world, tmp_path):
     assert has_chart(folder)
     read = read_chart(folder)
     assert read.t0_mjd2000 == world.chart.t0_mjd2000
-    for name in ("rows", "offsets", "target", "m_star", "delta_v", "points", "source", "to"):
+    for name in ("rows", "offsets", "target", "inverse", "speed", "points", "source", "to"):
         np.testing.assert_array_equal(getattr(read, name), getattr(world.chart, name))
 
 
 def test_a_damaged_file_of_a_chart_is_one_clear_error(world, tmp_path):
     write_chart(world.chart, tmp_path / "chart")
-    file = tmp_path / "chart" / "m_star.npy"
+    file = tmp_path / "chart" / "inverse.npy"
     file.write_bytes(file.read_bytes()[:1000])
-    with pytest.raises(InputError, match=r"m_star\.npy: not a chart's file"):
+    with pytest.raises(InputError, match=r"inverse\.npy: not a chart's file"):
         read_chart(tmp_path / "chart")
