@@ -72,17 +72,19 @@ def _looked_up(
 
 @inner_kernel
 def home_days(
-    ready: float,
-    mass: float,
+    there: tuple[float, float, float],
     row: int,
-    left: float,
     grid: Grid,
     home: Home,
     units: tuple[float, float],
     craft: Craft,
     work: Work,
 ) -> float:
-    """Return the shortest flight to the end; NEVER where there is none."""
+    """Return the shortest flight to the end; NEVER where there is none.
+
+    `there` are the epoch from which it may begin, the mass, and the days that are left.
+    """
+    ready, mass, left = there
     t0, step, _ = grid
     first, index, inverse, speed, log_tof = home
     m_dry, _, thrust, exhaust, reserve = craft
@@ -206,10 +208,8 @@ def expand(
                 days = NEVER
                 if part > homeward:
                     left = duration - elapsed - stay
-                    days = home_days(
-                        *(arrival + stay, after, j, left),
-                        *(grid, home, units, craft, home_work),
-                    )
+                    there = arrival + stay, after, left
+                    days = home_days(there, j, grid, home, units, craft, home_work)
                     if days > left and part > must:
                         continue
                 time_left = max(1.0 - part, _LEAST)
