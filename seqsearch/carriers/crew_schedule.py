@@ -15,6 +15,9 @@ from seqsearch.carriers.schedule import Act, Schedule, Step
 _FIRST_LEAD_DAYS: Final = 12.0
 """By how much an impulse comes before the release or capture that it is for, at first."""
 
+_SHORT_DAYS: Final = 250.0
+"""Time between captures on one orbit in which she does not move."""
+
 _RESERVE_DAYS: Final = 15.0
 """By how much retiming may shift the release of a probe that stays at last for all its time."""
 
@@ -128,6 +131,9 @@ def _capture_steps(captures: _Epochs, stay: int | None, change: Change) -> list[
     leave, arrive = change.impulses
     order = [number for _, number in captures]
     before = 0 if stay is None else order.index(stay)
+    # So little time before she has to be at rest that she had better be so for all.
+    resting = before if captures[before][0] - captures[0][0] < _SHORT_DAYS else 0
+    before -= resting
     steps: list[Step] = []
     if before == 0:
         steps.append(Step(Act.DEPART, leave.t_mjd2000))
@@ -142,7 +148,7 @@ def _capture_steps(captures: _Epochs, stay: int | None, change: Change) -> list[
         rests = number == stay
         if k == 0 and before > 0:
             steps.append(Step(Act.IMPULSE, arrive.t_mjd2000, dv_m_s=arrive.dv_m_s))
-        elif not rests:
+        elif not rests and k >= resting:
             steps.append(Step(Act.IMPULSE, epoch - _FIRST_LEAD_DAYS))
         steps.append(Step(Act.CAPTURE, epoch, number, stays=rests))
     return steps
