@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from feasibility.runtime.jit import inner_kernel, kernel
 from seqsearch.chart.curve_kernels import (
     NEVER,
+    is_among,
     mass_after,
     shortest_flight,
     squares,
@@ -124,14 +125,6 @@ def home_days(
     return NEVER
 
 
-@inner_kernel
-def _is_among(bodies: _Index, body: int) -> bool:
-    for other in bodies:  # noqa: SIM110 (numba has no generators here)
-        if other == body:
-            return True
-    return False
-
-
 @kernel
 def expand(
     nodes: tuple[_Index, _Array, _Array, _Array],
@@ -180,7 +173,7 @@ def expand(
         level = math.log(mass[i]) + reserve
         for p in range(offsets[base], offsets[base + 1]):
             j = target[p]
-            if closed[j] or _is_among(own[i], j):
+            if closed[j] or is_among(own[i], j):
                 continue
             least = _looked_up(inverse[p], speed[p], share, units, log_tof, level, work)
             if least >= NEVER:

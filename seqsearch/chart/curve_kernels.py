@@ -121,7 +121,8 @@ def mass_after(
 
 
 @inner_kernel
-def _is_among(bodies: _Index, body: int) -> bool:
+def is_among(bodies: _Index, body: int) -> bool:
+    """Tell whether a body is one of some."""
     for other in bodies:  # noqa: SIM110 (numba has no generators here)
         if other == body:
             return True
@@ -167,7 +168,7 @@ def expand(
         enough = math.exp(-2.0 * level)
         for p in range(offsets[base], offsets[base + 1]):
             j = target[p]
-            if closed[j] or _is_among(own[i], j):
+            if closed[j] or is_among(own[i], j):
                 continue
             squares(inverse[p], place - k, units[0], y)
             if y.min() > enough:
