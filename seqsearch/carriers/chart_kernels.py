@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from feasibility.runtime.jit import inner_kernel, kernel
 from seqsearch.chart.curve_kernels import (
     NEVER,
+    Work,
     is_among,
+    looked_up,
     mass_after,
-    shortest_flight,
-    squares,
     value_at,
 )
 
@@ -36,39 +36,11 @@ Home = tuple[int, _Index, _Codes, _Codes, _Array]
 Craft = tuple[float, float, float, float, float]
 """Dry and first mass (kg), thrust (N), exhaust velocity (m/s), reserve in log(m*)."""
 
-Work = tuple[_Array, _Array, _Array]
-"""Room for both curves of a leg, and for four differences."""
-
 HOME_TRIALS = 6
 HOME_STRETCH = 0.12
 """Flights to the end that are tried: by how much each is longer, in the logarithm."""
 
 _LEAST = 1e-6
-
-
-@inner_kernel
-def _looked_up(
-    inverse: _Codes,
-    speed: _Codes,
-    share: float,
-    units: tuple[float, float],
-    x: _Array,
-    level: float,
-    work: Work,
-) -> float:
-    """Write both curves of a leg; return its shortest flight for a log(m*), NEVER for none."""
-    y, v, differences = work
-    squares(inverse, share, units[0], y)
-    if y.min() > math.exp(-2.0 * level):
-        return NEVER
-    for q in range(len(x)):
-        y[q] = -0.5 * math.log(y[q])
-    shortest: float = shortest_flight(x, y, level, differences)
-    if shortest < NEVER:
-        squares(speed, share, units[1], v)
-        for q in range(len(x)):
-            v[q] = math.sqrt(v[q])
-    return shortest
 
 
 @inner_kernel
@@ -98,7 +70,7 @@ def home_days(
         return NEVER
     share = place - math.floor(place)
     level = math.log(mass) + reserve
-    least = _looked_up(inverse[h], speed[h], share, units, log_tof, level, work)
+    least = looked_up(inverse[h], speed[h], share, units, log_tof, level, work)
     if least >= NEVER:
         return NEVER
     last = min(math.log(max(left, 1.0)), log_tof[-1])
@@ -175,7 +147,7 @@ def expand(
             j = target[p]
             if closed[j] or is_among(own[i], j):
                 continue
-            least = _looked_up(inverse[p], speed[p], share, units, log_tof, level, work)
+            least = looked_up(inverse[p], speed[p], share, units, log_tof, level, work)
             if least >= NEVER:
                 continue
             for stretch in stretches:

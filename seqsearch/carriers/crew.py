@@ -61,10 +61,10 @@ _MOST_LOST: Final = 3
 _VISIT_DAYS: Final = 170.0
 """What a visit takes."""
 
-_DAYS_WORTH: Final = 0.25
 _MOST_SHARES: Final = 1.7
-"""What as many days as a visit takes are worth, and up to how many of them count: less than a
-visit in any case."""
+_DAYS_WORTH: Final = 0.98
+"""Up to how many times that count of what a probe has left; what they are worth if all probes have
+them."""
 
 
 @final
@@ -106,12 +106,14 @@ class Crew:
         """Return the visits, and what the days that are left after all stays are worth.
 
         Days of one probe are worth more than as many of two: a visit needs them together. More
-        than a visit takes are worth more still, as hardly any tour has one for exactly that.
+        than a visit takes are worth more still, as hardly any tour has one for exactly that. All
+        days together are worth less than a visit.
         """
         waits = self.waits()
         days = self._days_left(waits)
         shares = [min(max(left, 0.0) / _VISIT_DAYS, _MOST_SHARES) for left in days]
-        return self.visits() + _DAYS_WORTH * sum(share**2 for share in shares)
+        best = max(len(shares), 1) * _MOST_SHARES**2
+        return self.visits() + _DAYS_WORTH * sum(share**2 for share in shares) / best
 
     def _days_left(self, waits: Sequence[int | None]) -> list[float]:
         """Return the days that each probe has left if some stay at the orbits' asteroids."""

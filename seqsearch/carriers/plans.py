@@ -35,7 +35,7 @@ SPREAD_DAYS: Final = 900.0
 STAY_DAYS: Final = 30.0
 
 OVERTIME_DAYS: Final = 60.0
-"""By how much predicted tours may be too long: retiming makes them 10 to 100 days shorter."""
+"""By how much predicted tours may be too long: retiming makes them shorter."""
 
 RELEASES_DAYS: Final = 30.0
 """Step of the release epochs that are tried."""

@@ -8,7 +8,7 @@ import numpy as np
 from feasibility import InputError
 from feasibility.constants import AU, MJD2000_MJD
 from feasibility.orbits import Catalogue
-from seqsearch.carriers.crew import STAY_MARGIN_DAYS, TOUCH_DAYS, WAIT_DAYS, Crew
+from seqsearch.carriers.crew import TOUCH_DAYS, WAIT_DAYS, Crew
 from seqsearch.carriers.flight import captures_of, releases_of
 from seqsearch.polish.flight import fly
 from seqsearch.polish.itinerary import Itinerary
@@ -19,10 +19,6 @@ from seqsearch.tours.tour import Tour
 RELEASE_ID: Final = 10_000_001
 CAPTURE_ID: Final = 10_000_002
 """Ids of the mother ship's orbits, which no asteroid has."""
-
-_TOUCHES_DAYS: Final = tuple(TOUCH_DAYS + 0.1 * STAY_MARGIN_DAYS * k for k in range(6))
-"""Flight times between her and the asteroid at which she is. Such legs need no thrust but for
-rounding errors, in which the solver is lost now and then."""
 
 
 def probe_config(config: Config, catalogue: Catalogue, crew: Crew, number: int) -> Config:
@@ -88,33 +84,25 @@ def probe_tour(config: Config, catalogue: Catalogue, crew: Crew, number: int) ->
         A leg has no solution; cannot be, as it was flown before.
     """
     problem = build_problem(config, catalogue)
-    for touch_days in _TOUCHES_DAYS:
-        flight = fly(problem, _with_stays(problem.catalogue, catalogue, crew, number, touch_days))
-        if flight is not None:
-            return flight.to_tour(problem)
-    raise InputError(f"probe {number + 1}: a leg has no solution")
-
-
-def _with_stays(
-    bodies: Catalogue, catalogue: Catalogue, crew: Crew, number: int, touch_days: float
-) -> Itinerary:
-    """Return the itinerary of a probe from the mother ship and back, in rows of `bodies`."""
     itinerary = crew.flights[number].itinerary
     ids = catalogue.ids[itinerary.rows].tolist()
     t_dep, tof = list(itinerary.t_dep_mjd2000), list(itinerary.tof_days)
     waits, end = crew.waits(), crew.plan.ends[number]
     if waits[0] == number:
         released = releases_of(crew)[number]
-        ids, t_dep, tof = [RELEASE_ID, *ids], [released, *t_dep], [touch_days, *tof]
+        ids, t_dep, tof = [RELEASE_ID, *ids], [released, *t_dep], [TOUCH_DAYS, *tof]
     else:
         ids[0] = RELEASE_ID
     if end > 0 and waits[end] == number:
-        away = captures_of(crew)[number] - touch_days
-        ids, t_dep, tof = [*ids, CAPTURE_ID], [*t_dep, away], [*tof, touch_days]
+        away = captures_of(crew)[number] - TOUCH_DAYS
+        ids, t_dep, tof = [*ids, CAPTURE_ID], [*t_dep, away], [*tof, TOUCH_DAYS]
     else:
         ids[-1] = CAPTURE_ID
-    rows = bodies.rows_of(np.asarray(ids)).astype(np.intp)
-    return Itinerary(rows, np.array(t_dep), np.array(tof))
+    rows = problem.catalogue.rows_of(np.asarray(ids)).astype(np.intp)
+    flight = fly(problem, Itinerary(rows, np.array(t_dep), np.array(tof)))
+    if flight is None:
+        raise InputError(f"probe {number + 1}: a leg has no solution")
+    return flight.to_tour(problem)
 
 
 def _orbit(catalogue: Catalogue, row: int, body_id: int, name: str) -> BodyTable:

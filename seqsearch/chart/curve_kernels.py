@@ -26,6 +26,9 @@ Grid = tuple[float, float, int]
 Craft = tuple[float, float, float, float, float]
 """Least and first mass (kg), thrust (N), exhaust velocity (m/s), reserve in log(m*)."""
 
+Work = tuple[_Array, _Array, _Array]
+"""Room for both curves of a leg, and for four differences."""
+
 BURN_A = 4.18
 BURN_B = 0.82
 """Of `feasibility.classifier.predictor.bounded_final_mass`."""
@@ -108,6 +111,31 @@ def shortest_flight(x: _Array, y: _Array, level: float, work: _Array) -> float:
     return NEVER
 
 
+@inner_kernel
+def looked_up(
+    inverse: _Codes,
+    speed: _Codes,
+    share: float,
+    units: tuple[float, float],
+    x: _Array,
+    level: float,
+    work: Work,
+) -> float:
+    """Write both curves of a leg; return its shortest flight for a log(m*), NEVER for none."""
+    y, v, differences = work
+    squares(inverse, share, units[0], y)
+    if y.min() > math.exp(-2.0 * level):
+        return NEVER
+    for q in range(len(x)):
+        y[q] = -0.5 * math.log(y[q])
+    shortest: float = shortest_flight(x, y, level, differences)
+    if shortest < NEVER:
+        squares(speed, share, units[1], v)
+        for q in range(len(x)):
+            v[q] = math.sqrt(v[q])
+    return shortest
+
+
 @kernel
 def mass_after(
     mass: float, log_m_star: float, delta_v: float, tof_s: float, thrust: float, exhaust: float
@@ -156,7 +184,7 @@ def expand(
     m_least, m_first, thrust, exhaust, reserve = craft
     out_row, out_parent, out_arrival, out_mass, out_score = out
     total = 1.0 + w_mass
-    y, v, work = np.empty(len(x)), np.empty(len(x)), np.empty(4)
+    work = np.empty(len(x)), np.empty(len(x)), np.empty(4)
     count = 0
     for i in range(len(row)):
         place = (ready[i] - t0) / step
@@ -165,22 +193,13 @@ def expand(
             continue
         base = k * len(closed) + row[i]
         level = math.log(mass[i]) + reserve
-        enough = math.exp(-2.0 * level)
         for p in range(offsets[base], offsets[base + 1]):
             j = target[p]
             if closed[j] or is_among(own[i], j):
                 continue
-            squares(inverse[p], place - k, units[0], y)
-            if y.min() > enough:
-                continue
-            for q in range(len(x)):
-                y[q] = -0.5 * math.log(y[q])
-            shortest = shortest_flight(x, y, level, work)
+            shortest = looked_up(inverse[p], speed[p], place - k, units, x, level, work)
             if shortest == NEVER:
                 continue
-            squares(speed[p], place - k, units[1], v)
-            for q in range(len(x)):
-                v[q] = math.sqrt(v[q])
             for stretch in stretches:
                 at = shortest + stretch
                 tof = math.exp(at)
@@ -190,8 +209,8 @@ def expand(
                     break
                 after = mass_after(
                     mass[i],
-                    value_at(x, y, at, work),
-                    value_at(x, v, at, work),
+                    value_at(x, work[0], at, work[2]),
+                    value_at(x, work[1], at, work[2]),
                     tof * 86400.0,
                     thrust,
                     exhaust,

@@ -216,7 +216,7 @@ def fast_min_propellant(
         throttles[part], ratio[part], start[part], excess[part] = some
         seconds[part] = (time.thread_time() - began) / len(part)
     # The start closes the leg, whatever could not be made of it.
-    stuck = free & (ratio == 0.0)
+    stuck = ratio == 0.0
     ratio[stuck] = guess.m_final[rows][stuck] / guess.m0[rows][stuck]
     m_final = flyable.m0 * ratio
     found = _confirmed(flyable, throttles, flyable.m0, m_final, start, seconds, excess)

@@ -28,7 +28,6 @@ from seqsearch.chart.making import legs_of, make_chart
 from seqsearch.chart.roaming import Roaming, RoamingOrder, RoamingTour
 from seqsearch.core.ending import ending_of
 from seqsearch.core.nodes import Nodes
-from seqsearch.core.problem import Problem
 from seqsearch.polish.flight import Flight
 from seqsearch.polish.itinerary import Itinerary
 from seqsearch.polish.retiming import retime
@@ -74,13 +73,15 @@ _FLOWN: Final = 4
 """Itineraries that the pass after a round keeps to."""
 
 
-def chart_fits(problem: Problem, settings: SearchSettings, budget: Budget, threads: int) -> bool:
+def chart_fits(
+    problem: RendezvousProblem, settings: SearchSettings, budget: Budget, threads: int
+) -> bool:
     """Tell whether there is time for a chart, and whether beams over one find its tours.
 
     They start at any body that counts, and end anywhere.
     """
     remaining_s = budget.deadline.remaining_s()
-    if remaining_s is None or not isinstance(problem, RendezvousProblem):
+    if remaining_s is None:
         return False
     if ending_of(problem) is not None or problem.sequence or problem.unscored_ids:
         return False

@@ -115,6 +115,17 @@ def test_a_coasting_leg_can_carry_any_mass() -> None:
     assert found.m0[0] > 1e5
 
 
+def test_a_spacecraft_that_stays_where_it_is_burns_nothing_at_any_epoch() -> None:
+    rng = np.random.default_rng(3)
+    belt = synthetic_main_belt(2000, rng)
+    rows, t = rng.integers(len(belt), size=4000), rng.uniform(8000.0, 13000.0, 4000)
+    there, then = belt.states_at(rows, t), belt.states_at(rows, t + 0.01)
+    legs = Legs(there, then, 0.01, 900.0, 0.3, 3000.0, 800.0)
+    found = fast_min_propellant(legs)
+    assert found.converged.all()
+    assert found.m_final == pytest.approx(legs.m0, abs=1e-3)
+
+
 def test_never_much_below_the_reference_on_search_legs() -> None:
     legs = search_legs(12)
     fast, reference = fast_max_initial_mass(legs), reference_max_initial_mass(legs)

@@ -1,5 +1,6 @@
 """A crew's asteroids: which probes stay at those of the mother ship's orbits."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -66,3 +67,19 @@ def test_three_orbits_have_three_asteroids_for_probes_that_end_there():
 def test_closed_bodies_are_those_of_the_other_probes():
     assert crew_of(2000.0, 2000.0).closed(0) == (20, 21)
     assert crew_of(2000.0, 2000.0).closed() == (10, 11, 20, 21)
+
+
+def test_more_days_are_worth_more_and_all_of_them_less_than_a_visit():
+    # No stays: on a course that provides for none.
+    course = SimpleNamespace(stays=(None, None))
+
+    def worth(*durations):
+        return replace(crew_of(*durations), course=course).worth()
+
+    assert (
+        worth(1900.0, 2191.0, 2191.0)
+        > worth(1950.0, 2191.0, 2191.0)
+        > worth(2191.0, 2191.0, 2191.0)
+    )
+    assert worth(2000.0, 2191.0, 2191.0) > worth(2100.0, 2091.0, 2191.0)
+    assert worth(500.0, 500.0, 500.0) < 3 * 2 + 1

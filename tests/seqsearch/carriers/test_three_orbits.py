@@ -105,6 +105,20 @@ def test_a_schedule_has_a_way_to_each_orbit_and_is_in_order(schedule):
     assert all(a <= b for a, b in pairwise(flown.t[0]))
 
 
+def test_she_rests_on_an_orbit_if_captures_there_are_near_each_other(screen, plan):
+    begin = plan.begin_mjd2000
+    between = begin + 1000.0, begin + 1900.0
+    change = change_orbit(screen.catalogue, plan.first, plan.orbits[1], between)
+    near = _capture_steps([(begin + 2000.0, 1), (begin + 2100.0, 0)], 0, change)
+    assert [step.act for step in near] == [Act.DEPART, Act.ARRIVE, Act.CAPTURE, Act.CAPTURE]
+    assert [(step.probe, step.stays) for step in near[2:]] == [(1, False), (0, True)]
+    far = _capture_steps([(begin + 2000.0, 1), (begin + 2400.0, 0)], 0, change)
+    assert [step.act for step in far] == [
+        *(Act.IMPULSE, Act.IMPULSE, Act.CAPTURE),
+        *(Act.DEPART, Act.ARRIVE, Act.CAPTURE),
+    ]
+
+
 def test_she_is_at_rest_at_each_asteroid_when_she_arrives(schedule, screen, plan):
     x = schedule.start()
     x[0] += 0.7  # days of ten: an impulse before a release, and all that follows, is moved
