@@ -1,8 +1,9 @@
 """`Campaign`: the whole search for a mother ship's flight and the tours of her probes.
 
 Stages: chart all legs; rate plans that keep to one orbit, roughly and then better; look for second
-orbits, and for third ones; rate the best with wide beams; find the tours of all probes for those;
-improve the best crews. What each stage found is kept in a `CampaignState`.
+orbits, and for third ones; rate the best with wide beams, and variations of them; find the tours
+of all probes for those; improve the best crews. What each stage found is kept in a
+`CampaignState`.
 """
 
 import functools
@@ -10,7 +11,7 @@ import pickle
 import time
 from collections.abc import Callable, Hashable, Iterator, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, Final, final
 
 import numpy as np
@@ -24,12 +25,14 @@ from seqsearch.carriers.homing import HomingSettings
 from seqsearch.carriers.improving import improved, manned
 from seqsearch.carriers.leg_chart import ChartPart
 from seqsearch.carriers.plans import Plan, Screen
+from seqsearch.carriers.state_files import CampaignState
+from seqsearch.carriers.varying import varied
 from seqsearch.deadline import Deadline
 from seqsearch.problems.rendezvous import RendezvousProblem
 from seqsearch.tours.carrier.records import CarrierRules
 
 _ROUGH: Final = HomingSettings(width=40, results=1, thorough=False)
-_BETTER: Final = HomingSettings(width=300, results=1, thorough=False)
+_BETTER: Final = HomingSettings(width=300, results=1)
 _WIDE: Final = HomingSettings(width=1500, results=1)
 _CREWS: Final = HomingSettings(width=2000, results=12)
 """Beams that rate plans, in three stages, and those that find crews."""
@@ -40,8 +43,13 @@ _KEPT_PLANS: Final = 5000
 _BATCHES: Final = (60, 12, 12, 1, 2)
 """Plans in a task of each stage that rates: a task takes half a second and more."""
 
-_SHARES: Final = (0.15, 0.2, 0.26, 0.36, 0.48, 0.66)
+_SHARES: Final = (0.12, 0.2, 0.27, 0.42, 0.5)
+_VARIED_SHARE: Final = 0.64
+_MANNED_SHARE: Final = 0.78
 """Shares of a time limit after which the stages before improving end."""
+
+_PARENTS: Final = 25.0
+"""How far down the best plans those that are varied are, in the mean."""
 
 
 @final
@@ -57,6 +65,8 @@ class CampaignSettings:
         Plans for which second orbits are looked for, and third ones.
     judged : int
         Plans that are rated with wide beams.
+    varied : int
+        Variations of these that are rated so, too; they count as judged.
     manned : int
         Plans for which the tours of all probes are found.
     improvements : int
@@ -74,56 +84,12 @@ class CampaignSettings:
     continued: int = 150
     chained: int = 300
     judged: int = 900
+    varied: int = 3000
     manned: int = 150
     improvements: int = 400
     kept: int = 6
     crews: HomingSettings = _CREWS
     launch_share: float = 1.0
-
-
-@final
-@dataclass
-class CampaignState:
-    """What has been found, to go on from.
-
-    Attributes
-    ----------
-    seed : int
-        Varies the release windows and the attempts to improve.
-    limit_s : float, optional
-        Wall-clock time of all sessions; None for no limit.
-    catalogue_sha256 : str
-        Which asteroid table it is.
-    rated, sifted, continued, chained, judged : list of Plan
-        The best of each stage that rates, best first.
-    looked : list of int
-        How many plans were rated in each of these stages.
-    manned : int
-        Judged plans for which crews were looked for.
-    launch_share : float
-        Share of the launch window that is looked at.
-    tried : int
-        Attempts to improve.
-    crews : list of Crew
-        The best, of different plans, best first.
-    spent_s : float
-        Wall-clock time.
-    """
-
-    seed: int = 0
-    limit_s: float | None = None
-    catalogue_sha256: str = ""
-    rated: list[Plan] = field(default_factory=list)
-    sifted: list[Plan] = field(default_factory=list)
-    continued: list[Plan] = field(default_factory=list)
-    chained: list[Plan] = field(default_factory=list)
-    judged: list[Plan] = field(default_factory=list)
-    looked: list[int] = field(default_factory=lambda: [0, 0, 0, 0, 0])
-    manned: int = 0
-    tried: int = 0
-    launch_share: float = 1.0
-    crews: list[Crew] = field(default_factory=list)
-    spent_s: float = 0.0
 
 
 @final
@@ -183,6 +149,7 @@ class Campaign:
             self._continue,
             self._chain,
             self._judge,
+            self._vary,
             self._man,
             self._improve,
         ):
@@ -267,8 +234,27 @@ class Campaign:
             line = f"{state.looked[stage]} of {len(plans)} plans {name}, best {best:.2f}"
             self._report(state, line)
 
+    def _vary(self, state: CampaignState) -> None:
+        """Rate variations of the best plans, and of what has come of that."""
+        deadline = self._until(_VARIED_SHARE)
+        while state.judged and not state.manned and state.varied < self._settings.varied:
+            if deadline.passed():
+                return
+            moves = []
+            for number in range(state.varied, state.varied + 2 * self._at_once):
+                rng = np.random.default_rng([state.seed, 3, number])
+                plan = state.judged[min(int(rng.exponential(_PARENTS)), len(state.judged) - 1)]
+                moves.append((plan, int(rng.integers(1 << 31))))
+            batches = [moves[k : k + 2] for k in range(0, len(moves), 2)]
+            for plans in self._all(_varied, [(batch,) for batch in batches]):
+                state.judged += [plan for plan in plans if plan.value > 0.0]
+            state.varied += len(moves)
+            state.judged = _different(state.judged)[:_KEPT_PLANS]
+            best = state.judged[0].value
+            self._report(state, f"{state.varied} variations looked at, best {best:.2f}")
+
     def _man(self, state: CampaignState) -> None:
-        deadline = self._until(_SHARES[5])
+        deadline = self._until(_MANNED_SHARE)
         plans = state.judged[: self._settings.manned]
         while state.manned < len(plans):
             if deadline.passed() and state.crews:
@@ -344,7 +330,7 @@ def launches_of(rules: CarrierRules, state: CampaignState) -> tuple[float, float
 
 def _is_over(state: CampaignState, stage: int) -> bool:
     """Tell whether a later stage has begun; then none goes back to this one."""
-    return any(state.looked[stage + 1 :]) or state.manned > 0
+    return any(state.looked[stage + 1 :]) or state.varied > 0 or state.manned > 0
 
 
 def _charted(context: _Context, k: int) -> ChartPart:
@@ -369,6 +355,10 @@ def _with_value(screen: Screen, plan: Plan, *, beams: HomingSettings, probes: in
 
 def _chained(screen: Screen, plan: Plan) -> list[Plan]:
     return chained_plans(screen, plan, _BETTER)
+
+
+def _varied(context: _Context, moves: Sequence[tuple[Plan, int]]) -> list[Plan]:
+    return [found for plan, seed in moves for found in varied(context.screen, plan, seed, _WIDE)]
 
 
 def _valued(context: _Context, plans: Sequence[Plan], rate: _Rate) -> list[Plan]:

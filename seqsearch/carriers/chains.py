@@ -26,7 +26,7 @@ the windows of probes for the second and for the third orbit."""
 _LEAST_LATER_DAYS: Final = 700.0
 """Less than that is too little time for the second change."""
 
-_RETURN_DAYS: Final = 2160.0
+RETURN_DAYS: Final = 2160.0
 """Time from a release to the capture, at which she has to be there."""
 
 _PROBE_KG: Final = 850.0
@@ -35,7 +35,7 @@ _PROBE_KG: Final = 850.0
 _SHIFTS_DAYS: Final = (-200.0, 0.0, 200.0)
 """Beginnings of the windows that are tried, after that of a plan with fewer orbits."""
 
-_HOPEFUL: Final = 1.04
+HOPEFUL: Final = 1.04
 """Changes may be that much too dear: with impulses at the best time they cost less."""
 
 _MOST: Final = 80
@@ -122,16 +122,16 @@ def _chains(screen: Screen, plan: Plan, shift_days: float) -> Iterator[_Chain]:
     seconds, costs = next_orbits(
         orbits,
         plan.first,
-        (begin + later, begin + _RETURN_DAYS),
-        _HOPEFUL * exhaust * float(np.log(alone / rules.m_dry_kg)),
+        (begin + later, begin + RETURN_DAYS),
+        HOPEFUL * exhaust * float(np.log(alone / rules.m_dry_kg)),
     )
     for second, cost in zip(seconds[:_MOST], costs[:_MOST], strict=True):
-        mass = mass_after(rules, alone, float(cost) / _HOPEFUL) + _PROBE_KG
+        mass = mass_after(rules, alone, float(cost) / HOPEFUL) + _PROBE_KG
         left = exhaust * float(np.log(mass / (rules.m_dry_kg + _PROBE_KG)))
         if left <= 0.0:
             continue
-        between = begin + _RETURN_DAYS, begin + later + _RETURN_DAYS
-        for third in next_orbits(orbits, int(second), between, _HOPEFUL * left)[0]:
+        between = begin + RETURN_DAYS, begin + later + RETURN_DAYS
+        for third in next_orbits(orbits, int(second), between, HOPEFUL * left)[0]:
             if third != plan.first:
                 yield _Chain(int(second), int(third), begin, later)
 
@@ -181,25 +181,51 @@ def later_window(
     route = screen.route(plan)
     if route is None:
         return begin, end
-    rules, orbits = screen.rules, screen.catalogue
-    alone = mass_after(rules, rules.m0_kg, route.delta_v) - rules.craft_count * rules.craft.m0_kg
-    caught = _PROBE_KG * len(captures_mjd2000)
     released, first, last = max(releases_mjd2000), min(captures_mjd2000), max(captures_mjd2000)
-    latest = route.launch_mjd2000 + rules.max_duration_days - screen.duration_days
+    latest = route.launch_mjd2000 + screen.rules.max_duration_days - screen.duration_days
     epochs = np.arange(begin - _LATE_DAYS, latest, _WINDOW_STEP_DAYS)
     missing = np.full(len(epochs), np.inf)
     for k, epoch in enumerate(epochs):
         changes = (max(released, epoch), first), (last, epoch + _TOUR_DAYS)
-        if min(after - before for before, after in changes) < _WINDOW_STEP_DAYS:
-            continue
-        mass = alone
-        for orbit, between in enumerate(changes):
-            aboard = orbit * caught
-            goal = np.array([plan.orbits[orbit + 1]])
-            cost = float(change_costs(orbits, plan.orbits[orbit], goal, between)[0])
-            mass = mass_after(rules, mass + aboard, cost) - aboard if np.isfinite(cost) else 0.0
-        missing[k] = rules.m_dry_kg - mass
+        if min(after - before for before, after in changes) >= _WINDOW_STEP_DAYS:
+            missing[k] = -left_kg(screen, plan, route, changes)
     if not np.isfinite(missing).any():
         return begin, end
     good = epochs[missing <= max(_SHORT_KG, float(missing.min()) + _SHORT_KG)]
     return float(good[0]), float(max(good[-1], good[0] + _WINDOW_STEP_DAYS))
+
+
+def left_kg(
+    screen: Screen,
+    plan: Plan,
+    route: Route,
+    changes_mjd2000: Sequence[tuple[float, float]],
+    hopeful: float = 1.0,
+) -> float:
+    """Return the propellant that a mother ship has left at the end; negative for what is missing.
+
+    Parameters
+    ----------
+    screen : Screen
+        Knows bodies and rules.
+    plan : Plan
+        Her orbits, and on which of them probes are caught.
+    route : Route
+        To the first one.
+    changes_mjd2000 : sequence of tuple of float
+        Earliest departure and latest arrival of each change of orbit.
+    hopeful : float
+        By what factor changes may cost less than Lambert arcs on a rough grid.
+    """
+    rules = screen.rules
+    mass = mass_after(rules, rules.m0_kg, route.delta_v) - rules.craft_count * rules.craft.m0_kg
+    for orbit, (begin, end) in enumerate(changes_mjd2000):
+        if mass <= rules.m_dry_kg or end <= begin:
+            return -np.inf
+        aboard = _PROBE_KG * sum(end_ <= orbit for end_ in plan.ends)
+        goal = np.array([plan.orbits[orbit + 1]])
+        cost = float(change_costs(screen.catalogue, plan.orbits[orbit], goal, (begin, end))[0])
+        if not np.isfinite(cost):
+            return -np.inf
+        mass = mass_after(rules, mass + aboard, cost / hopeful) - aboard
+    return mass - rules.m_dry_kg

@@ -48,6 +48,13 @@ _HOME_FARTHEST: Final = 5500.0
 _HOME_MOST: Final = 120
 """Bodies from which there may be a way to an end."""
 
+_HOME_ASKED: Final = 4
+_HOME_HEAVY_ENOUGH: Final = 1.05
+"""There is one if m* is that many dry masses at one of the flight times."""
+
+_MOST_ASKED: Final = 6000
+"""Intervals of ends that are remembered, of some kilobytes each."""
+
 
 @final
 @dataclass(frozen=True, eq=False)
@@ -215,6 +222,8 @@ class ChartMaker:
         self._unit = inverse_unit(spacecraft.m_dry)
         # Margins are best known for masses that legs have.
         self._mass = float(np.sqrt(m0 * spacecraft.m_dry))
+        self._asked: dict[tuple[int, int], tuple[_Index, _Codes, _Codes]] = {}
+        self._home_points: dict[int, NDArray[np.float32]] = {}
 
     def part(self, k: int) -> ChartPart:
         """Return an interval."""
@@ -235,23 +244,57 @@ class ChartMaker:
         return ChartPart(counts, target.astype(np.int32), *curves, points)
 
     def ways(self, end: int, first: int, last: int) -> Ways:
-        """Return the legs to a body in intervals from `first` up to `last`, also long ones."""
-        index = np.full((last - first + 1, len(self._rows)), -1, dtype=np.int32)
-        sources, epochs, count = [], [], 0
-        for k in range(first, last + 1):
-            begin = self._t0 + k * STEP_DAYS
-            points = self._points(begin + 0.5 * STEP_DAYS, _HOME_METRIC_DAYS)
-            distance = np.linalg.norm(points - points[end], axis=1)
-            near = np.argsort(distance, kind="stable")[1 : _HOME_MOST + 1]
-            near = near[distance[near] < _HOME_FARTHEST]
-            index[k - first, near] = np.arange(count, count + len(near))
-            count += len(near)
-            sources.append(near)
-            epochs.append(np.full(len(near), begin))
-        source = np.concatenate(sources)
-        target = np.full(len(source), end)
-        curves = self._curves(source, target, np.concatenate(epochs), HOME_TOF_DAYS)
-        return Ways(end, first, index, *curves, np.log(HOME_TOF_DAYS))
+        """Return the legs to a body in intervals from `first` up to `last`, also long ones.
+
+        What was asked once is kept.
+        """
+        wanted = range(first, last + 1)
+        missing = [k for k in wanted if (end, k) not in self._asked]
+        if len(self._asked) + len(missing) > _MOST_ASKED:
+            self._asked.clear()
+            missing = list(wanted)
+        if missing:
+            self._ask_ways(end, np.array(missing))
+        index = np.full((len(wanted), len(self._rows)), -1, dtype=np.int32)
+        parts = [self._asked[end, k] for k in wanted]
+        count = 0
+        for k, (bodies, _, _) in enumerate(parts):
+            index[k, bodies] = np.arange(count, count + len(bodies))
+            count += len(bodies)
+        inverse, speed = (np.concatenate([part[i] for part in parts]) for i in (1, 2))
+        return Ways(end, first, index, inverse, speed, np.log(HOME_TOF_DAYS))
+
+    def _ask_ways(self, end: int, intervals: _Index) -> None:
+        """Ask about the legs to a body from those that are near it, and keep the answers."""
+        near = [self._near(end, int(k)) for k in intervals]
+        source, interval = np.concatenate(near), np.repeat(intervals, list(map(len, near)))
+        middle: _Array = np.asarray(self._t0 + (interval + 0.5) * STEP_DAYS, dtype=np.float64)
+        goal, tof = np.full(len(source), end), float(HOME_TOF_DAYS[_HOME_ASKED])
+        codes, _ = self._codes(source, goal, middle, tof)
+        enough = codes <= 1.0 / (_HOME_HEAVY_ENOUGH * self._craft.m_dry * self._unit)
+        source, interval = source[enough], interval[enough]
+        # Departures that two intervals share are asked about once.
+        halves = (N_EPOCHS - 1) * interval[:, None] + np.arange(N_EPOCHS)
+        keys, where = np.unique(halves * len(self._rows) + source[:, None], return_inverse=True)
+        half, source_of = np.divmod(keys, len(self._rows))
+        departure = self._t0 + half / (N_EPOCHS - 1) * STEP_DAYS
+        goal = np.full(len(keys), end)
+        asked = [self._codes(source_of, goal, departure, tof) for tof in HOME_TOF_DAYS]
+        place = where.reshape(halves.shape)
+        inverse, speed = (np.stack([pair[i] for pair in asked], axis=-1)[place] for i in (0, 1))
+        for k in intervals:
+            rows = interval == k
+            self._asked[end, int(k)] = source[rows], inverse[rows], speed[rows]
+
+    def _near(self, end: int, k: int) -> _Index:
+        """Return the bodies from which there may be a way to one in an interval."""
+        if k not in self._home_points:
+            middle = self._t0 + (k + 0.5) * STEP_DAYS
+            self._home_points[k] = self._points(middle, _HOME_METRIC_DAYS).astype(np.float32)
+        points = self._home_points[k]
+        distance = np.linalg.norm(points - points[end], axis=1)
+        near = np.argpartition(distance, min(_HOME_MOST, len(points) - 1))[: _HOME_MOST + 1]
+        return np.sort(near[(distance[near] < _HOME_FARTHEST) & (near != end)])
 
     def _points(self, t_mjd2000: float, days: float) -> _Array:
         return orbital_metric(self._catalogue.states_at(self._rows, t_mjd2000), days)

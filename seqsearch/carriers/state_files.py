@@ -1,6 +1,6 @@
-"""The state of a campaign as a file, from which it goes on."""
+"""`CampaignState`: what a campaign has found, and the file from which it goes on."""
 
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Final, final
 
@@ -9,7 +9,6 @@ import numpy as np
 
 from feasibility import InputError
 from feasibility.runtime.atomic import write_text
-from seqsearch.carriers.campaign import CampaignState
 from seqsearch.carriers.course import Course
 from seqsearch.carriers.crew import Crew, own_problem
 from seqsearch.carriers.plans import Plan
@@ -23,6 +22,54 @@ _FORMAT: Final = "seqsearch-campaign-3"
 
 _PlanRow = tuple[tuple[int, ...], tuple[int, ...], tuple[tuple[float, float], ...], float]
 """Ids of the orbits' bodies, the probes' ends and windows, value."""
+
+
+@final
+@dataclass
+class CampaignState:
+    """What has been found, to go on from.
+
+    Attributes
+    ----------
+    seed : int
+        Varies the release windows and the attempts to improve.
+    limit_s : float, optional
+        Wall-clock time of all sessions; None for no limit.
+    catalogue_sha256 : str
+        Which asteroid table it is.
+    rated, sifted, continued, chained, judged : list of Plan
+        The best of each stage that rates, best first.
+    looked : list of int
+        How many plans were rated in each of these stages.
+    varied : int
+        Variations of judged plans that were looked at.
+    manned : int
+        Judged plans for which crews were looked for.
+    launch_share : float
+        Share of the launch window that is looked at.
+    tried : int
+        Attempts to improve.
+    crews : list of Crew
+        The best, of different plans, best first.
+    spent_s : float
+        Wall-clock time.
+    """
+
+    seed: int = 0
+    limit_s: float | None = None
+    catalogue_sha256: str = ""
+    rated: list[Plan] = field(default_factory=list)
+    sifted: list[Plan] = field(default_factory=list)
+    continued: list[Plan] = field(default_factory=list)
+    chained: list[Plan] = field(default_factory=list)
+    judged: list[Plan] = field(default_factory=list)
+    looked: list[int] = field(default_factory=lambda: [0, 0, 0, 0, 0])
+    varied: int = 0
+    manned: int = 0
+    tried: int = 0
+    launch_share: float = 1.0
+    crews: list[Crew] = field(default_factory=list)
+    spent_s: float = 0.0
 
 
 class _Record(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -62,6 +109,7 @@ class _StateRecord(_Record, frozen=True, kw_only=True):
     spent_s: float
     catalogue_sha256: str
     looked: tuple[int, ...]
+    varied: int = 0
     manned: int
     launch_share: float
     tried: int
@@ -94,6 +142,7 @@ def write_state(path: Path, state: CampaignState, problem: RendezvousProblem) ->
         spent_s=state.spent_s,
         catalogue_sha256=state.catalogue_sha256,
         looked=tuple(state.looked),
+        varied=state.varied,
         manned=state.manned,
         launch_share=state.launch_share,
         tried=state.tried,
@@ -176,6 +225,7 @@ def read_state(path: Path, problem: RendezvousProblem) -> CampaignState:
         spent_s=record.spent_s,
         catalogue_sha256=record.catalogue_sha256,
         looked=list(record.looked),
+        varied=record.varied,
         manned=record.manned,
         launch_share=record.launch_share,
         tried=record.tried,

@@ -14,12 +14,12 @@ from feasibility.runtime.provenance import provenance
 from feasibility.runtime.terminal import Level, say
 from feasibility.runtime.workers import default_workers
 from seqsearch.budget import Limits
-from seqsearch.carriers.campaign import Campaign, CampaignSettings, CampaignState, launches_of
+from seqsearch.carriers.campaign import Campaign, CampaignSettings, launches_of
 from seqsearch.carriers.crew import Crew
 from seqsearch.carriers.flight import carrier_of
 from seqsearch.carriers.plans import Screen
 from seqsearch.carriers.probe_tours import probe_config, probe_tour
-from seqsearch.carriers.state_files import read_state, write_state
+from seqsearch.carriers.state_files import CampaignState, read_state, write_state
 from seqsearch.problems.problem_file import (
     Config,
     build_problem,

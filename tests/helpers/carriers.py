@@ -243,6 +243,7 @@ TINY_CAMPAIGN = CampaignSettings(
     continued=1,
     chained=1,
     judged=2,
+    varied=4,
     manned=2,
     improvements=4,
     crews=HomingSettings(width=100, results=2),

@@ -147,6 +147,18 @@ def test_thorough_ways_reach_farther_and_agree_where_both_know(world):
     assert far.log_tof[-1] == np.log(HOME_TOF_DAYS[-1])
 
 
+def test_ways_are_the_same_whether_asked_at_once_or_in_parts(world):
+    end = int(np.bincount(world.chart.target).argmax())
+    whole = charted().maker.ways(end, 3, 7)
+    maker = charted().maker
+    maker.ways(end, 4, 4)
+    maker.ways(end, 6, 7)
+    again = maker.ways(end, 3, 7)
+    np.testing.assert_array_equal(whole.index, again.index)
+    for name in ("inverse", "speed"):
+        np.testing.assert_allclose(getattr(whole, name), getattr(again, name), atol=1)
+
+
 def test_a_folder_gives_the_chart_back(world, tmp_path):
     folder = tmp_path / "chart"
     assert not has_chart(folder)

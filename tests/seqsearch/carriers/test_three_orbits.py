@@ -1,21 +1,23 @@
 """A mother ship that goes on to a third orbit: her schedule, her course, when probes leave."""
 
+from dataclasses import replace
 from itertools import pairwise
 from types import SimpleNamespace
 
+import msgspec
 import numpy as np
 import pytest
 
 from feasibility import Spacecraft
 from feasibility.orbits import Catalogue, synthetic_main_belt
-from seqsearch.carriers.campaign import CampaignState
-from seqsearch.carriers.chains import chained_plans, later_window
+from seqsearch.carriers.chains import chained_plans, later_window, left_kg
 from seqsearch.carriers.crew_schedule import _capture_steps, _release_steps
 from seqsearch.carriers.homing import HomingSettings
-from seqsearch.carriers.mother import change_orbit, later_budget, next_orbits
+from seqsearch.carriers.mother import change_costs, change_orbit, later_budget, next_orbits
 from seqsearch.carriers.plans import Plan, Screen
 from seqsearch.carriers.schedule import Act, Schedule
-from seqsearch.carriers.state_files import read_state, write_state
+from seqsearch.carriers.state_files import CampaignState, read_state, write_state
+from seqsearch.carriers.varying import varied
 from seqsearch.problems.gtoc7.rules import carrier_rules
 from seqsearch.problems.rendezvous import RendezvousProblem
 from seqsearch.settings import SearchSettings
@@ -202,3 +204,59 @@ def test_chained_plans_have_three_orbits_within_her_means(screen, plan, monkeypa
 def test_a_state_file_keeps_plans_with_three_orbits(problem, plan, tmp_path):
     write_state(tmp_path / "state.json", CampaignState(chained=[plan]), problem)
     assert read_state(tmp_path / "state.json", problem).chained == [plan]
+
+
+def _rated_by_its_orbits(screen, plan, settings, probes):
+    return replace(plan, value=float(sum(plan.orbits) + probes))
+
+
+def test_variations_of_a_plan_are_other_plans_that_she_may_fly(screen, plan, monkeypatch):
+    monkeypatch.setattr(Screen, "valued", _rated_by_its_orbits)
+    tried = [varied(screen, plan, seed, HomingSettings()) for seed in range(60)]
+    found = [one for variations in tried for one in variations]
+    assert 10 < len(found) <= 60
+    for other in found:
+        assert other.value == sum(other.orbits) + 3
+        changed = [
+            sum(a != b for a, b in zip(other.orbits, plan.orbits, strict=True)),
+            int(other.windows_mjd2000 != plan.windows_mjd2000),
+            int(other.ends != plan.ends),
+        ]
+        assert changed[0] <= 1
+        assert sum(changed) >= 1
+        assert len(set(other.orbits)) == 3
+        assert set(other.ends) == set(plan.ends)
+        assert screen.route(other) is not None
+        lengths = {
+            end: np.diff(w)[0] for w, end in zip(plan.windows_mjd2000, plan.ends, strict=True)
+        }
+        for window, end in zip(other.windows_mjd2000, other.ends, strict=True):
+            assert np.diff(window)[0] == pytest.approx(lengths[end])
+    names = ("orbits", "windows_mjd2000", "ends")
+    kinds = np.array([[getattr(o, n) != getattr(plan, n) for n in names] for o in found])
+    assert kinds.any(axis=0).all()
+    again = [varied(screen, plan, seed, HomingSettings()) for seed in range(5)]
+    assert again == tried[:5]
+
+
+def test_no_variation_without_the_propellant_for_it(screen, plan, problem, tmp_path, monkeypatch):
+    monkeypatch.setattr(Screen, "valued", _rated_by_its_orbits)
+    heavy = msgspec.structs.replace(carrier_rules(), m_dry_kg=11_500.0)
+    poor = Screen(problem, heavy, None, SearchSettings(), tmp_path / "chart")
+    assert not any(varied(poor, plan, seed, HomingSettings()) for seed in range(10))
+
+
+def test_what_is_left_is_what_the_changes_leave(screen, plan):
+    rules, route = screen.rules, screen.route(plan)
+    begin = plan.begin_mjd2000
+    changes = (begin + 1000.0, begin + 2160.0), (begin + 2200.0, begin + 3000.0)
+    exhaust = rules.isp_s * rules.g0_m_s2
+    mass = rules.m0_kg * np.exp(-route.delta_v / exhaust) - 3 * 2000.0
+    for orbit, (aboard, between) in enumerate(zip((0.0, 850.0), changes, strict=True)):
+        goal = np.array([plan.orbits[orbit + 1]])
+        cost = change_costs(screen.catalogue, plan.orbits[orbit], goal, between)[0]
+        mass = (mass + aboard) * np.exp(-cost / exhaust) - aboard
+    left = left_kg(screen, plan, route, changes)
+    assert left == pytest.approx(mass - rules.m_dry_kg, abs=1e-6)
+    assert left_kg(screen, plan, route, changes, 1.04) > left
+    assert left_kg(screen, plan, route, (changes[0][::-1], changes[1])) == -np.inf
