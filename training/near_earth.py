@@ -6,7 +6,8 @@ interrupted:
     python training/near_earth.py --out data/default --model better.seqmodel
 
 Legs of `LEGS` are made as `default_model.py` makes them: the family `nearby`, and some of each
-older one, so that nothing is forgotten. Fine-tuning on them alone gains on `nearby` and loses a
+older one, so that nothing is forgotten; and `HARD` ones of the first, of which the model before is
+most unsure. Fine-tuning on them alone gains on `nearby` and loses a
 little elsewhere. The mean of the weights before and after loses nothing (Wortsman et al. 2022,
 "Robust fine-tuning of zero-shot models"); one half was chosen beforehand, not by a test.
 Calibration and thresholds are those of the mean. Nets for final masses and free ends are kept.
@@ -18,15 +19,16 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
-from default_model import TRAINING_SEED, generate, protocol
+from default_model import HARD_FACTOR, HARD_SEED, TRAINING_SEED, generate, protocol
 
 from feasibility import FeasibilityClassifier
 from feasibility.classifier.artefact import Artefact
 from feasibility.dataset import read_dataset
+from feasibility.learning.margin.hard_examples import harder
 from feasibility.learning.margin.train import MarginRecipe, train_margin
 
 LEGS: Final = {
-    "nearby": 40_000,
+    "nearby": 80_000,
     "nea": 30_000,
     "search": 25_000,
     "table1": 20_000,
@@ -34,6 +36,9 @@ LEGS: Final = {
     "craft2900": 6_000,
 }
 """Family: legs, the first of those with which the default model would be made from nothing."""
+
+HARD: Final = 20_000
+"""The most doubtful of the family `nearby`, among `HARD_FACTOR` times as many."""
 
 _WEIGHTS: Final = ("model/weight", "model/bias", "quick/weight", "quick/bias")
 
@@ -64,6 +69,11 @@ def main() -> int:
         made = protocol(family, options.shared / "gtoc" / "official")
         generate(made, legs, folder, TRAINING_SEED, options.workers)
         datasets.append(read_dataset(folder))
+    folder = options.out / "hard" / "nearby"
+    nearby = protocol("nearby", options.shared / "gtoc" / "official")
+    made = harder(nearby, Path(options.start), HARD_FACTOR)
+    generate(made, HARD, folder, HARD_SEED, options.workers)
+    datasets.append(read_dataset(folder))
     start = FeasibilityClassifier.load(options.start).artefact
     recipe = MarginRecipe(epochs=16, learning_rate=4e-4, batch=1024, seed=1, threads=2)
     checkpoint = options.model.with_name(f"{options.model.name}.checkpoint")

@@ -94,13 +94,16 @@ def _other_windows(plan: Plan, rng: np.random.Generator) -> Plan:
 
 
 def _other_ends(plan: Plan, rng: np.random.Generator) -> Iterator[Plan]:
-    """Yield plans in which one probe has the end and the window of another one."""
+    """Yield plans in which one probe has the end and the window of another one.
+
+    Probes for earlier orbits stay before those for later ones.
+    """
     for number, other in rng.permutation(list(permutations(range(len(plan.ends)), 2))):
-        ends = list(plan.ends)
-        ends[number] = ends[other]
-        if plan.ends[number] != plan.ends[other] and set(ends) == set(plan.ends):
-            changed = replace(plan, ends=tuple(ends))
-            yield changed.with_window(int(number), plan.windows_mjd2000[other])
+        probes = list(zip(plan.ends, plan.windows_mjd2000, strict=True))
+        probes[number] = probes[other]
+        ends, windows = zip(*sorted(probes), strict=True)
+        if plan.ends != ends and set(ends) == set(plan.ends):
+            yield replace(plan, ends=ends, windows_mjd2000=windows)
 
 
 def _can_be_flown(screen: Screen, plan: Plan) -> bool:

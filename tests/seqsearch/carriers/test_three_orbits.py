@@ -226,6 +226,7 @@ def test_variations_of_a_plan_are_other_plans_that_she_may_fly(screen, plan, mon
         assert sum(changed) >= 1
         assert len(set(other.orbits)) == 3
         assert set(other.ends) == set(plan.ends)
+        assert list(other.ends) == sorted(other.ends)
         assert screen.route(other) is not None
         lengths = {
             end: np.diff(w)[0] for w, end in zip(plan.windows_mjd2000, plan.ends, strict=True)
