@@ -5,9 +5,10 @@ again, with the others' asteroids closed.
 """
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
+from types import MappingProxyType
 from typing import Final, final
 
 import numpy as np
@@ -393,14 +394,22 @@ def find_crew(
     problem: RendezvousProblem,
     plan: Plan,
     settings: HomingSettings,
+    kept: Mapping[int, Flight] = MappingProxyType({}),
 ) -> Crew:
-    """Return the tours of all probes, found one after another; fewer where there are no more."""
+    """Return the tours of all probes, found one after another; fewer where there are no more.
+
+    Those of some probes may be there already.
+    """
     crew = Crew(plan, ())
+    taken = [int(row) for flight in kept.values() for row in flight.itinerary.rows[1:-1]]
     for number, end in enumerate(plan.ends):
-        if end > 1:
-            window = _later_window(screen, crew, number)
-            crew = replace(crew, plan=crew.plan.with_window(number, window))
-        flight = find_probe(screen, problem, crew, number, crew.closed(), settings)
+        flight = kept.get(number)
+        if flight is None:
+            if end > 1:
+                window = _later_window(screen, crew, number)
+                crew = replace(crew, plan=crew.plan.with_window(number, window))
+            avoid = [*crew.closed(), *taken]
+            flight = find_probe(screen, problem, crew, number, avoid, settings)
         if flight is None:
             break
         crew = replace(crew, flights=(*crew.flights, flight))

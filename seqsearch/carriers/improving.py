@@ -16,6 +16,8 @@ from seqsearch.carriers.flight import carrier_of
 from seqsearch.carriers.homing import HomingSettings
 from seqsearch.carriers.joint import Wishes, joined, joined_crew
 from seqsearch.carriers.plans import RELEASES_DAYS, Plan, Screen
+from seqsearch.carriers.varying import variations
+from seqsearch.polish.flight import Flight
 from seqsearch.problems.rendezvous import RendezvousProblem
 
 _TWO_ANEW: Final = 0.2
@@ -26,6 +28,9 @@ _REPAIRED: Final = 0.3
 
 _JOINED: Final = (0.25, 0.08)
 """Share of attempts before them that polish all at once: for a crew that has not been, and has."""
+
+_REPLANNED: Final = 0.25
+"""Share of the others that vary the plan."""
 
 _WIDTHS: Final = (300.0, 5000.0)
 """Widths of beams that improve a tour."""
@@ -38,13 +43,48 @@ def manned(
 
     None where there are too few tours, or no mother ship can serve them.
     """
-    crew = find_crew(screen, problem, plan, settings)
-    if len(crew.flights) < len(plan.ends):
+    return _served(screen, problem, find_crew(screen, problem, plan, settings))
+
+
+def _served(screen: Screen, problem: RendezvousProblem, crew: Crew) -> Crew | None:
+    """Return a crew that a mother ship can serve; polished with her where she needs that."""
+    if len(crew.flights) < len(crew.plan.ends):
         return None
     if carrier_of(screen, crew) is not None:
         return crew
-    wishes = Wishes((1.0,) * len(plan.ends))
+    wishes = Wishes((1.0,) * len(crew.flights))
     return joined(screen, problem, crew, wishes, rng=np.random.default_rng(0))
+
+
+def replanned(
+    screen: Screen,
+    problem: RendezvousProblem,
+    crew: Crew,
+    number: int,
+    rng: np.random.Generator,
+    settings: HomingSettings,
+) -> Crew | None:
+    """Return a crew of a varied plan, with new tours where the old ones do not fit; None for none.
+
+    That of one probe is new in any case.
+    """
+    plan = next(variations(screen, crew.plan, rng), None)
+    if plan is None:
+        return None
+    kept = {
+        k: flight
+        for k, flight in enumerate(crew.flights)
+        if crew.course is None and k != number and _fits(flight, plan, k)
+    }
+    return _served(screen, problem, find_crew(screen, problem, plan, settings, kept))
+
+
+def _fits(flight: Flight, plan: Plan, number: int) -> bool:
+    """Tell whether a tour is one of a plan's probe."""
+    rows, begin = flight.itinerary.rows, float(flight.itinerary.t_dep_mjd2000[0])
+    first, last = plan.windows_mjd2000[number]
+    ends = int(rows[0]) == plan.first and int(rows[-1]) == plan.end(number)
+    return ends and first <= begin <= last and not set(rows[1:-1].tolist()) & set(plan.orbits)
 
 
 def improved(
@@ -53,7 +93,7 @@ def improved(
     """Look for a better crew in one of several ways that the seed draws; None where there is none.
 
     One probe or two are looked for anew, one is rebuilt from some visit on, repaired or polished
-    by exchanges; or the mother ship and all probes are polished together.
+    by exchanges; the plan is varied; or the mother ship and all probes are polished together.
     """
     rng = np.random.default_rng(seed)
     if rng.random() < _JOINED[crew.course is not None]:
@@ -65,6 +105,8 @@ def improved(
         results=int(rng.integers(2, 12)),
     )
     weights, offset = (settings.propellant_weight,), float(rng.uniform(0.0, RELEASES_DAYS))
+    if rng.random() < _REPLANNED:
+        return replanned(screen, problem, crew, number, rng, settings)
     kind = rng.random()
     if kind < _TWO_ANEW:
         other = int((number + rng.integers(1, len(crew.flights))) % len(crew.flights))

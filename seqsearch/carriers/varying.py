@@ -32,8 +32,8 @@ _DEARER: Final = 150.0
 _SHIFT_DAYS: Final = 120.0
 """Most by which windows are moved."""
 
-_SHORT_KG: Final = 30.0
-"""Propellant that may be missing: impulses at the best time save that much."""
+_LEAST_KG: Final = 50.0
+"""Propellant that has to be left: tours shorten the time for a change."""
 
 
 def varied(screen: Screen, plan: Plan, seed: int, settings: HomingSettings) -> list[Plan]:
@@ -50,7 +50,12 @@ def varied(screen: Screen, plan: Plan, seed: int, settings: HomingSettings) -> l
     settings : HomingSettings
         Of the beams.
     """
-    rng = np.random.default_rng(seed)
+    found = next(variations(screen, plan, np.random.default_rng(seed)), None)
+    return [] if found is None else [screen.valued(found, settings, len(found.ends))]
+
+
+def variations(screen: Screen, plan: Plan, rng: np.random.Generator) -> Iterator[Plan]:
+    """Yield variations of a plan, all in the same respect, that she may be able to fly."""
     kind = rng.random()
     if kind < _ORBIT:
         others: Iterable[Plan] = _other_orbits(screen, plan, rng)
@@ -58,10 +63,7 @@ def varied(screen: Screen, plan: Plan, seed: int, settings: HomingSettings) -> l
         others = [_other_windows(plan, rng)]
     else:
         others = _other_ends(plan, rng)
-    for other in others:
-        if _can_be_flown(screen, other):
-            return [screen.valued(other, settings, len(other.ends))]
-    return []
+    return (other for other in others if _can_be_flown(screen, other))
 
 
 def _other_orbits(screen: Screen, plan: Plan, rng: np.random.Generator) -> Iterator[Plan]:
@@ -113,7 +115,7 @@ def _can_be_flown(screen: Screen, plan: Plan) -> bool:
     route = screen.route(plan)
     if route is None:
         return False
-    return left_kg(screen, plan, route, _changes(plan), HOPEFUL) >= -_SHORT_KG
+    return left_kg(screen, plan, route, _changes(plan), HOPEFUL) >= _LEAST_KG
 
 
 def _changes(plan: Plan) -> list[tuple[float, float]]:
