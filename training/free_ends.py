@@ -17,7 +17,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
-from default_model import HARD_FACTOR, HARD_SEED, TRAINING_SEED, generate, protocol
+from default_model import FAMILIES, HARD_FACTOR, HARD_SEED, TRAINING_SEED, generate, protocol
 
 from feasibility import FeasibilityClassifier
 from feasibility.classifier.margin.views import FREE_ENDS
@@ -25,14 +25,9 @@ from feasibility.dataset import read_dataset
 from feasibility.learning.margin.hard_examples import harder
 from feasibility.learning.margin.train import MarginRecipe, train_free_ends
 
-LEGS: Final = {
-    "launch": 50_000,
-    "arrival": 35_000,
-    "launch-flyby": 50_000,
-    "flyby": 110_000,
-    "flyby-nea": 15_000,
-    "free": 20_000,
-}
+LEGS: Final = ("launch", "arrival", "launch-flyby", "flyby", "flyby-nea", "free")
+"""Families of which as many legs are made as for the default model."""
+
 HARD: Final = {"launch": 20_000, "arrival": 15_000, "launch-flyby": 30_000, "flyby": 40_000}
 """Family: legs."""
 
@@ -49,8 +44,8 @@ def main() -> int:
     options = parser.parse_args()
     tables = options.shared / "gtoc" / "official"
     datasets = []
-    for family, legs in LEGS.items():
-        folder = options.out / "train" / family
+    for family in LEGS:
+        legs, folder = FAMILIES[family][0], options.out / "train" / family
         generate(protocol(family, tables), legs, folder, TRAINING_SEED, options.workers)
         datasets.append(read_dataset(folder))
     for family, legs in HARD.items():

@@ -28,7 +28,7 @@ from feasibility.learning.margin.hard_examples import harder
 from feasibility.learning.margin.train import MarginRecipe, train_margin
 
 LEGS: Final = {
-    "nearby": 80_000,
+    "nearby": 40_000,
     "nea": 30_000,
     "search": 25_000,
     "table1": 20_000,
