@@ -6,11 +6,12 @@ interrupted:
     python training/near_earth.py --out data/default --model better.seqmodel
 
 Legs of `LEGS` are made as `default_model.py` makes them: the family `nearby`, and some of each
-older one, so that nothing is forgotten; and `HARD` ones of the first, of which the model before is
-most unsure. Fine-tuning on them alone gains on `nearby` and loses a
+older one, so that nothing is forgotten. Fine-tuning on them alone gains on `nearby` and loses a
 little elsewhere. The mean of the weights before and after loses nothing (Wortsman et al. 2022,
 "Robust fine-tuning of zero-shot models"); one half was chosen beforehand, not by a test.
 Calibration and thresholds are those of the mean. Nets for final masses and free ends are kept.
+`--hard N` adds N of the family `nearby` of which the model before is most unsure; not part of the
+default model.
 """
 
 import argparse
@@ -37,9 +38,6 @@ LEGS: Final = {
 }
 """Family: legs, the first of those with which the default model would be made from nothing."""
 
-HARD: Final = 20_000
-"""The most doubtful of the family `nearby`, among `HARD_FACTOR` times as many."""
-
 _WEIGHTS: Final = ("model/weight", "model/bias", "quick/weight", "quick/bias")
 
 
@@ -60,6 +58,7 @@ def main() -> int:
     parser.add_argument("--out", type=Path, default=Path("data/default"), help="folder of legs")
     parser.add_argument("--start", default="default", help="model to go on from")
     parser.add_argument("--model", type=Path, required=True, help="file of the new model")
+    parser.add_argument("--hard", type=int, default=0, help="doubtful legs (default 0)")
     parser.add_argument("--workers", type=int, default=2, help="processes (default 2)")
     parser.add_argument("--shared", type=Path, default=Path("../shared"), help="data folder")
     options = parser.parse_args()
@@ -69,15 +68,19 @@ def main() -> int:
         made = protocol(family, options.shared / "gtoc" / "official")
         generate(made, legs, folder, TRAINING_SEED, options.workers)
         datasets.append(read_dataset(folder))
-    folder = options.out / "hard" / "nearby"
-    nearby = protocol("nearby", options.shared / "gtoc" / "official")
-    made = harder(nearby, Path(options.start), HARD_FACTOR)
-    generate(made, HARD, folder, HARD_SEED, options.workers)
-    datasets.append(read_dataset(folder))
+    hard = []
+    if options.hard:
+        folder = options.out / "hard" / "nearby"
+        made = protocol("nearby", options.shared / "gtoc" / "official")
+        made = harder(made, Path(options.start), HARD_FACTOR)
+        generate(made, options.hard, folder, HARD_SEED, options.workers)
+        hard.append(read_dataset(folder))
     start = FeasibilityClassifier.load(options.start).artefact
     recipe = MarginRecipe(epochs=16, learning_rate=4e-4, batch=1024, seed=1, threads=2)
     checkpoint = options.model.with_name(f"{options.model.name}.checkpoint")
-    tuned = train_margin(datasets, recipe, start=start, checkpoint=checkpoint, on_epoch=print)
+    tuned = train_margin(
+        [*datasets, *hard], recipe, start=start, checkpoint=checkpoint, on_epoch=print
+    )
     mean = half_way(start, tuned)
     train_margin(datasets, replace(recipe, epochs=0), start=mean).save(options.model)
     checkpoint.unlink(missing_ok=True)

@@ -81,7 +81,7 @@ class HomingSettings:
         Look finely at flight times and masses, where few orders of visit are left.
     thorough : bool
         Ask the classifier about the ways to the end, also from farther away than the chart's
-        neighbours: half a second for an end.
+        neighbours: a tenth of a second for an end, once.
     """
 
     width: int = 300

@@ -323,19 +323,6 @@ class Screen:
         closed = np.unique([*plan.orbits, *avoid])
         return self.homing.run(starts, plan.end(number), closed, settings)
 
-    def near_orbits(self, row: int, t_mjd2000: float, count: int) -> _Index:
-        """Return rows of the bodies nearest to one at an epoch whose orbits she may use."""
-        chart = self.homing.chart
-        places = chart.positions(np.array([row]))
-        if len(places) == 0:
-            return np.zeros(0, dtype=np.intp)
-        points = chart.points[chart.interval(t_mjd2000)]
-        distance = np.linalg.norm(points - points[places[0]], axis=1)
-        distance[~np.isin(chart.rows, self._below(_ELEMENTS))] = np.inf
-        order = np.argsort(distance, kind="stable")[1 : count + 1]
-        near: _Index = chart.rows[order[np.isfinite(distance[order])]]
-        return near
-
     def route(self, plan: Plan) -> Route | None:
         """Return the cheapest way to the first orbit that is in time; None for none."""
         key = plan.first, plan.begin_mjd2000, plan.last_mjd2000

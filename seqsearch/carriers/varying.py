@@ -22,12 +22,12 @@ _ONE_END: Final = 0.4
 """Shares of variations with another orbit and with other windows, of the probes with one end
 or of all; the rest change an end."""
 
-_NEAR: Final = 60
 _TRIED: Final = 8
-"""Orbits near one of a plan among which others are drawn, and how many are."""
+"""Other orbits that are drawn until one can be flown to."""
 
 _DEARER: Final = 150.0
-"""m/s that another change of orbit may cost more."""
+_APART: Final = 1000.0
+"""m/s that another change of orbit may cost more; how far another single orbit may be from one."""
 
 _SHIFT_DAYS: Final = 120.0
 """Most by which windows are moved."""
@@ -69,15 +69,15 @@ def variations(screen: Screen, plan: Plan, rng: np.random.Generator) -> Iterator
 def _other_orbits(screen: Screen, plan: Plan, rng: np.random.Generator) -> Iterator[Plan]:
     """Yield plans with another orbit in one's place, from which or to which she can go."""
     place = int(rng.integers(len(plan.orbits)))
-    if len(plan.orbits) == 1:
-        near = screen.near_orbits(plan.first, plan.begin_mjd2000, _NEAR)
-    else:
+    begin, most = plan.begin_mjd2000, _APART
+    at, between = plan.first, (begin, begin + RETURN_DAYS)
+    if len(plan.orbits) > 1:
         # Between two orbits it costs nearly the same in both directions.
         at = plan.orbits[place - 1 if place else 1]
         between = _changes(plan)[max(place - 1, 0)]
         now = np.array([plan.orbits[place]])
-        cost = float(change_costs(screen.catalogue, at, now, between)[0])
-        near, _ = next_orbits(screen.catalogue, at, between, cost + _DEARER)
+        most = _DEARER + float(change_costs(screen.catalogue, at, now, between)[0])
+    near, _ = next_orbits(screen.catalogue, at, between, most)
     for row in rng.permutation(near[~np.isin(near, plan.orbits)])[:_TRIED]:
         orbits = list(plan.orbits)
         orbits[place] = int(row)

@@ -240,6 +240,14 @@ def test_variations_of_a_plan_are_other_plans_that_she_may_fly(screen, plan, mon
     assert again == tried[:5]
 
 
+def test_a_plan_with_one_orbit_is_varied_too(screen, plan, monkeypatch):
+    monkeypatch.setattr(Screen, "valued", _rated_by_its_orbits)
+    alone = Plan.together(plan.orbits[:1], plan.begin_mjd2000, 3)
+    found = [one for seed in range(20) for one in varied(screen, alone, seed, HomingSettings())]
+    assert {len(other.orbits) for other in found} == {1}
+    assert {other.orbits for other in found} > {alone.orbits}
+
+
 def test_no_variation_without_the_propellant_for_it(screen, plan, problem, tmp_path, monkeypatch):
     monkeypatch.setattr(Screen, "valued", _rated_by_its_orbits)
     heavy = msgspec.structs.replace(carrier_rules(), m_dry_kg=11_500.0)
