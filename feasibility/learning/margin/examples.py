@@ -1,7 +1,7 @@
 """`MarginExamples`: solved legs as the nets of a margin model see them."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Final, final
 
 import numpy as np
@@ -11,13 +11,14 @@ from feasibility.classifier.margin.views import RENDEZVOUS, LegView
 from feasibility.dataset import Dataset
 from feasibility.dataset.splits import pairs_of_bodies
 from feasibility.errors import InputError
+from feasibility.legs import Legs
 
 _Array = NDArray[np.float64]
 
-_RELEVANT: Final = 0.6
-"""Legs whose own margin is beyond this are learned with `_FAR_WEIGHT`: their m* hardly matters."""
+RELEVANT: Final = 0.6
+"""Legs whose own margin is beyond this are learned with `FAR_WEIGHT`: their m* hardly matters."""
 
-_FAR_WEIGHT: Final = 0.25
+FAR_WEIGHT: Final = 0.25
 
 
 @final
@@ -65,29 +66,48 @@ class MarginExamples:
             label = dataset.metadata["protocol"]["label"]
             if label != "margin":
                 raise InputError(f"margin model: a dataset is labelled by {label}, not by margin")
-            columns = dataset.columns
-            legs = dataset.legs
-            X, hint = view.features(legs)
+            parts.append(cls.of_legs(dataset.legs, dataset.columns["m_star_kg"], pairs, view))
+        return cls.concatenate(parts)
+
+    @classmethod
+    def concatenate(cls, parts: Sequence["MarginExamples"]) -> "MarginExamples":
+        """Return all examples of one or more parts in order."""
+        names = [field.name for field in fields(cls)]
+        return cls(**{n: np.concatenate([getattr(part, n) for part in parts]) for n in names})
+
+    @classmethod
+    def of_legs(
+        cls,
+        legs: Legs,
+        m_star: _Array,
+        pairs: NDArray[np.int64],
+        view: LegView,
+        *,
+        quick: bool = True,
+    ) -> "MarginExamples":
+        """Compute features and targets of those of some legs whose m* (n,) in kg is known.
+
+        Without the `quick` features there are none of these, and no quick hint.
+        """
+        X, hint = view.features(legs)
+        X_quick, quick_hint = np.empty((len(legs), 0)), np.full(len(legs), np.nan)
+        if quick:
             X_quick, quick_hint = view.quick_features(legs)
-            with np.errstate(divide="ignore"):
-                target = view.log_acceleration(legs, columns["m_star_kg"])
-            target = np.maximum(target, view.least())
-            known = np.isfinite(target) & np.isfinite(hint)
-            relevant = np.abs(columns["log_margin"]) < _RELEVANT
-            parts.append(
-                {
-                    "X": X[known],
-                    "hint": hint[known],
-                    "X_quick": X_quick[known],
-                    "quick_hint": quick_hint[known],
-                    "target": target[known],
-                    "weight": np.where(relevant, 1.0, _FAR_WEIGHT)[known],
-                    "pairs": pairs[known],
-                    "kinds": view.kinds_of(legs)[known],
-                }
-            )
-        whole = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-        return cls(**whole)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            target = view.log_acceleration(legs, m_star)
+            relevant = np.abs(np.log(m_star / legs.m0)) < RELEVANT
+        target = np.maximum(target, view.least())
+        known = np.isfinite(target) & np.isfinite(hint)
+        return cls(
+            X=X[known],
+            hint=hint[known],
+            X_quick=X_quick[known],
+            quick_hint=quick_hint[known],
+            target=target[known],
+            weight=np.where(relevant, 1.0, FAR_WEIGHT)[known],
+            pairs=pairs[known],
+            kinds=view.kinds_of(legs)[known],
+        )
 
     @property
     def error(self) -> _Array:

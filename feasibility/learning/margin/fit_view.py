@@ -75,7 +75,7 @@ class FittedView:
 
 @final
 @dataclass(frozen=True, eq=False)
-class _Parts:
+class Parts:
     """Rows of the three parts, all of them or those with a rough hint."""
 
     learned: NDArray[np.intp]
@@ -83,7 +83,7 @@ class _Parts:
     calibration: NDArray[np.intp]
 
     @classmethod
-    def of(cls, examples: MarginExamples, recipe: MarginRecipe) -> "_Parts":
+    def of(cls, examples: MarginExamples, recipe: MarginRecipe) -> "Parts":
         """Split by pairs of bodies.
 
         Raises
@@ -100,10 +100,10 @@ class _Parts:
             )
         return parts
 
-    def rough(self, examples: MarginExamples) -> "_Parts":
+    def rough(self, examples: MarginExamples) -> "Parts":
         """Return the rows with a rough hint."""
         has_hint = np.isfinite(examples.quick_hint)
-        return _Parts(
+        return Parts(
             *(rows[has_hint[rows]] for rows in (self.learned, self.validation, self.calibration))
         )
 
@@ -138,7 +138,7 @@ def fit_view(
     MissingDependencyError
         The extra ``train`` is not installed.
     """
-    parts = _Parts.of(examples, recipe)
+    parts = Parts.of(examples, recipe)
     known = {} if start is None else _sections_of(start, view)
     net, quick = _fit_nets(examples, parts, recipe, known, checkpoint, on_epoch)
     # Estimates of log m* and what is wrong with them: a larger acceleration is a smaller m*.
@@ -151,7 +151,7 @@ def fit_view(
         "model": net,
         "quick": _with_settled(quick, examples, parts, view, known.get("quick")),
         "domain": domain,
-        "calibration": _calibration(examples.kinds[rows], view, residual, expected, recipe.seed),
+        "calibration": calibration_of(examples.kinds[rows], view, residual, expected, recipe.seed),
     }
     middle = _fit_middle(examples, parts, view, recipe, known.get("middle"))
     if middle:
@@ -180,7 +180,7 @@ def _sections_of(start: Artefact, view: LegView) -> _Sections:
 
 def _fit_nets(
     examples: MarginExamples,
-    parts: _Parts,
+    parts: Parts,
     recipe: MarginRecipe,
     known: _Sections,
     checkpoint: Path | None,
@@ -207,7 +207,7 @@ def _fit_nets(
 
 def _fit_middle(
     examples: MarginExamples,
-    parts: _Parts,
+    parts: Parts,
     view: LegView,
     recipe: MarginRecipe,
     known: Mapping[str, NDArray[Any]] | None,
@@ -241,7 +241,7 @@ def add_middle(
     MissingDependencyError
         The extra ``train`` is not installed.
     """
-    found = _fit_middle(examples, _Parts.of(examples, recipe), view, recipe, None)
+    found = _fit_middle(examples, Parts.of(examples, recipe), view, recipe, None)
     prefix = f"{view.section('middle')}/"
     kept = {name: array for name, array in artefact.arrays.items() if not name.startswith(prefix)}
     arrays = {**kept, **{f"{prefix}{name}": array for name, array in found.items()}}
@@ -251,7 +251,7 @@ def add_middle(
 def _with_settled(
     net: Mapping[str, NDArray[Any]],
     examples: MarginExamples,
-    parts: _Parts,
+    parts: Parts,
     view: LegView,
     known: Mapping[str, NDArray[Any]] | None,
 ) -> dict[str, NDArray[Any]]:
@@ -303,7 +303,7 @@ def _no_narrower(settled: _Array, known: Mapping[str, NDArray[Any]] | None) -> _
     )
 
 
-def _calibration(
+def calibration_of(
     kinds: NDArray[np.intp], view: LegView, residual: _Array, expected: _Array, seed: int
 ) -> dict[str, _Array]:
     """Return the arrays of the calibration, with one row a kind where there are kinds."""
@@ -325,7 +325,7 @@ def _calibration(
 
 
 def _domain(
-    examples: MarginExamples, parts: _Parts, view: LegView, known: _Sections
+    examples: MarginExamples, parts: Parts, view: LegView, known: _Sections
 ) -> dict[str, NDArray[Any]]:
     """Return the ranges of the legs learned from, and of those of the model begun with."""
     quantities = np.concatenate(
