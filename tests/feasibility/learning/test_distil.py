@@ -114,7 +114,7 @@ def test_packing_refuses_what_has_none_and_unpacking_what_is_none(dataset, tmp_p
         pack([dataset], RENDEZVOUS, tmp_path / "legs.npz")
     other = tmp_path / "other.npz"
     other.write_bytes(b"PK\x03\x04 nothing")
-    with pytest.raises(InputError, match="other.npz: not a file of packed legs"):
+    with pytest.raises(InputError, match=r"other\.npz: not a file of packed legs"):
         unpack(other)
 
 
