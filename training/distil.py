@@ -40,41 +40,34 @@ SECOND_SEED, SECOND_HARD_SEED, UNSOLVED_SEED = 12, 103, 900
 
 VIEWS: Final = {"rendezvous": RENDEZVOUS, "free-ends": FREE_ENDS}
 
+_FREE: Final = ("launch", "arrival", "launch-flyby", "flyby", "flyby-nea", "free")
+
 LEGS: Final = {
-    "rendezvous": {
-        **{
-            family: legs
-            for family, (legs, _) in FAMILIES.items()
-            if family in ("search", "table1", "nea", "neaall", "general", "nearby")
-            or family.startswith("craft")
-        },
-    },
-    "free-ends": {
-        family: FAMILIES[family][0]
-        for family in ("launch", "arrival", "launch-flyby", "flyby", "flyby-nea", "free")
-    },
+    "rendezvous": {name: legs for name, (legs, _) in FAMILIES.items() if name not in _FREE},
+    "free-ends": {name: FAMILIES[name][0] for name in _FREE},
 }
 """Sort: family: legs of the default model."""
 
-MORE: Final = {
-    "rendezvous": {"nearby": 60_000},
-    "free-ends": {"launch-flyby": 20_000, "flyby": 20_000},
-}
+MORE: Final = {"rendezvous": {"nearby": 120_000}, "free-ends": {}}
 """The same with another seed."""
 
 HARD: Final = {
-    "rendezvous": {"nearby": ((20_000, HARD_SEED), (20_000, SECOND_HARD_SEED))},
+    "rendezvous": {
+        "nearby": ((20_000, HARD_SEED), (20_000, SECOND_HARD_SEED)),
+        "nea": ((30_000, SECOND_HARD_SEED),),
+        "general": ((15_000, SECOND_HARD_SEED),),
+    },
     "free-ends": {
         "flyby": ((40_000, HARD_SEED), (40_000, SECOND_HARD_SEED)),
         "launch-flyby": ((30_000, HARD_SEED), (40_000, SECOND_HARD_SEED)),
-        "launch": ((40_000, SECOND_HARD_SEED),),
+        "launch": ((20_000, SECOND_HARD_SEED),),
         "arrival": ((15_000, SECOND_HARD_SEED),),
     },
 }
 """Legs of which the model before is most unsure, and their seeds."""
 
-UNSOLVED: Final = {"rendezvous": 1_500_000, "free-ends": 2_500_000}
-"""Legs about which the teachers are asked, in the proportions of `LEGS`."""
+UNSOLVED: Final = 3_000_000
+"""Legs about which the teachers are asked, in the proportions of the solved ones."""
 
 _DRAWN_AT_ONCE: Final = 5000
 
@@ -138,10 +131,16 @@ def draw(job: tuple[str, str, int, Path]) -> Part:
 
 def unsolved_legs(sort: str, count: int, tables: Path, workers: int) -> UnsolvedLegs:
     """Draw legs in the proportions of the families."""
-    total = sum(LEGS[sort].values())
+    solved = {
+        family: legs
+        + MORE[sort].get(family, 0)
+        + sum(number for number, _ in HARD[sort].get(family, ()))
+        for family, legs in LEGS[sort].items()
+    }
+    total = sum(solved.values())
     jobs = [
         (sort, family, number, tables)
-        for family, legs in LEGS[sort].items()
+        for family, legs in solved.items()
         for number in range(max(1, round(count * legs / total / _DRAWN_AT_ONCE)))
     ]
     draw(jobs[0])
@@ -206,16 +205,14 @@ def main() -> int:
     parser.add_argument("--start", default="default", help="model to go on from")
     parser.add_argument("--teachers", type=int, default=8, help="nets that learn (default 8)")
     parser.add_argument("--width", type=int, default=512, help="of theirs (default 512)")
-    parser.add_argument("--teacher-epochs", type=int, default=100, help="(default 100)")
-    parser.add_argument("--student-epochs", type=int, default=40, help="(default 40)")
-    parser.add_argument("--unsolved", type=int, help="legs to ask about")
+    parser.add_argument("--teacher-epochs", type=int, default=80, help="(default 80)")
+    parser.add_argument("--student-epochs", type=int, default=100, help="(default 100)")
+    parser.add_argument("--unsolved", type=int, default=UNSOLVED, help="legs to ask about")
     parser.add_argument("--device", default="auto", help="cpu, cuda, auto (default)")
     parser.add_argument("--workers", type=int, default=2, help="processes (default 2)")
     parser.add_argument("--shared", type=Path, default=Path("../shared"), help="data folder")
     parser.add_argument("--tables", type=Path, help="folder of the official tables")
     options = parser.parse_args()
-    if options.unsolved is None:
-        options.unsolved = UNSOLVED[options.sort]
     if options.verb == "pack":
         datasets = [read_dataset(folder) for folder in folders(options.sort, options)]
         print(pack(datasets, VIEWS[options.sort], options.file), "legs")
