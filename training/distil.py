@@ -165,9 +165,15 @@ def train(options: argparse.Namespace) -> None:
     shape = {"device": options.device, "threads": options.workers, "seed": 1}
     how = Distillation(
         teachers=StackRecipe(
-            count=options.teachers, epochs=options.teacher_epochs, width=options.width, **shape
+            count=options.teachers,
+            epochs=options.teacher_epochs,
+            width=options.width,
+            batch=options.batch,
+            **shape,
         ),
-        student=StackRecipe(epochs=options.student_epochs, batch=2048, width=256, **shape),
+        student=StackRecipe(
+            epochs=options.student_epochs, batch=2 * options.batch, width=256, **shape
+        ),
     )
 
     def on_epoch(who: str, epoch: int, loss: float) -> None:
@@ -207,6 +213,9 @@ def main() -> int:
     parser.add_argument("--width", type=int, default=512, help="of theirs (default 512)")
     parser.add_argument("--teacher-epochs", type=int, default=80, help="(default 80)")
     parser.add_argument("--student-epochs", type=int, default=100, help="(default 100)")
+    parser.add_argument(
+        "--batch", type=int, default=1024, help="legs a step, the student's twice (default 1024)"
+    )
     parser.add_argument("--unsolved", type=int, default=UNSOLVED, help="legs to ask about")
     parser.add_argument("--device", default="auto", help="cpu, cuda, auto (default)")
     parser.add_argument("--workers", type=int, default=2, help="processes (default 2)")

@@ -1,5 +1,6 @@
 """Ensembles in one stack of matrices, packed legs, and a student that learns from teachers."""
 
+import importlib
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,6 +20,8 @@ from feasibility.learning.margin.packed import pack, unpack
 from feasibility.learning.margin.stack import Lessons, StackRecipe, fit_stack, mean_opinion
 
 torch = pytest.importorskip("torch")
+
+TRAINING = Path(__file__).resolve().parents[3] / "training"
 
 SMALL = StackRecipe(count=2, layers=2, width=16, epochs=30, batch=128, device="cpu", threads=1)
 
@@ -144,3 +147,43 @@ def test_a_student_replaces_one_net_and_nothing_else(dataset):
     assert {len(error) for error in found.errors.values()} == {len(found.held_out)}
     answer = FeasibilityClassifier(found.model).predict(dataset.legs)
     assert np.all(np.isfinite(answer.margin))
+
+
+def test_the_program_packs_and_trains(shared, tmp_path: Path, monkeypatch, capsys):
+    monkeypatch.syspath_prepend(str(TRAINING))
+    program = importlib.import_module("distil")
+    monkeypatch.setattr(program, "LEGS", {"free-ends": {"launch": 150, "flyby": 150}})
+    monkeypatch.setattr(program, "MORE", {"free-ends": {"flyby": 40}})
+    monkeypatch.setattr(program, "HARD", {"free-ends": {"flyby": ((40, 103),)}})
+    monkeypatch.setattr(program, "_DRAWN_AT_ONCE", 100)
+    file, model = tmp_path / "legs.npz", tmp_path / "better.seqmodel"
+    common = ["--file", str(file), "--workers", "1", "--shared", str(shared)]
+    monkeypatch.setattr(
+        "sys.argv", ["distil", "pack", "free-ends", "--out", str(tmp_path / "legs"), *common]
+    )
+    assert program.main() == 0
+    assert "380 legs" in capsys.readouterr().out
+    small = [
+        "--teachers",
+        "2",
+        "--width",
+        "16",
+        "--teacher-epochs",
+        "5",
+        "--student-epochs",
+        "5",
+        "--batch",
+        "64",
+    ]
+    monkeypatch.setattr(
+        "sys.argv",
+        ["distil", "train", "free-ends", "--model", str(model), "--unsolved", "200", "--device",
+         "cpu", *small, *common],
+    )  # fmt: skip
+    assert program.main() == 0
+    printed = capsys.readouterr().out
+    assert "teachers 5" in printed
+    assert "dataset 3" in printed
+    record = FeasibilityClassifier.load(str(model)).artefact.provenance["distilled"]["free-ends"]
+    assert record["legs"] > 370
+    assert record["unsolved"] > 150
