@@ -204,11 +204,20 @@ def _with_record(artefact: Artefact, other: Artefact) -> Artefact:
     def joined(own: Mapping[str, Any], record: Mapping[str, Any]) -> dict[str, Any]:
         return {**own, **({"free_ends": record["free_ends"]} if "free_ends" in record else {})}
 
+    def taught(model: Artefact) -> dict[str, Any]:
+        return dict(model.provenance.get("distilled", {}))
+
+    # Students of an ensemble have a record of their own for each sort of legs.
+    free = taught(other).get("free-ends")
+    distilled = {name: one for name, one in taught(artefact).items() if name != "free-ends"}
+    if free is not None:
+        distilled["free-ends"] = free
+    provenance = joined(artefact.provenance, other.provenance)
     return replace(
         artefact,
         config=joined(artefact.config, other.config),
         metrics=joined(artefact.metrics, other.metrics),
-        provenance=joined(artefact.provenance, other.provenance),
+        provenance={**provenance, **({"distilled": distilled} if distilled else {})},
     )
 
 
