@@ -188,7 +188,7 @@ def train(options: argparse.Namespace) -> None:
     relevant = examples.weight[found.held_out] == 1.0
     for number in [-1, *np.unique(source)]:
         rows = relevant if number < 0 else relevant & (source[found.held_out] == number)
-        # Were masses put anywhere within 15 % of m*, so many would be decided rightly.
+        # Share that is decided rightly where masses are put anywhere within 15 % of m*.
         right = {
             who: 1.0 - np.mean(np.minimum(np.abs(error[rows]), 0.14)) / 0.28
             for who, error in found.errors.items()
