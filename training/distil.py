@@ -1,4 +1,4 @@
-r"""Make the large nets of the default model better: an ensemble learns, the nets learn from it.
+"""Make the large nets of the default model better: an ensemble learns, the nets learn from it.
 
 Run from the root of the checkout, with the folder `shared` beside it:
 
@@ -6,15 +6,10 @@ Run from the root of the checkout, with the folder `shared` beside it:
     python training/distil.py pack free-ends --out data/default --file data/free-ends.npz
     python training/distil.py train rendezvous --file data/rendezvous.npz --model better.seqmodel
 
-    python training/distil.py pack-new free-ends --out data/default --file data/new.npz
-    python training/distil.py go-on free-ends --file data/new.npz --start better.seqmodel \
-        --unsolved 300000 --student-epochs 12 --model best.seqmodel
-
 The first two make the legs of `LEGS`, `MORE` and `HARD` as `default_model.py` makes them and write
 what is needed to one file; they go on where they were interrupted. The third can run elsewhere:
 with a GPU it takes minutes, without one days. It replaces the large net for one sort of legs and
 its calibration; the quick ones, the thresholds, the domain and the nets for the final mass stay.
-The last two let a net learn legs that it has never seen, in minutes without a GPU.
 """
 
 import argparse
@@ -33,7 +28,7 @@ from feasibility.classifier.margin.views import FREE_ENDS, RENDEZVOUS, LegView
 from feasibility.dataset import read_dataset
 from feasibility.dataset.labels import file_sha256, load_catalogue
 from feasibility.dataset.protocol import Protocol
-from feasibility.learning.margin.distil import Distillation, UnsolvedLegs, distil, go_on
+from feasibility.learning.margin.distil import Distillation, UnsolvedLegs, distil
 from feasibility.learning.margin.examples import RELEVANT, MarginExamples
 from feasibility.learning.margin.hard_examples import harder
 from feasibility.learning.margin.packed import pack, unpack
@@ -42,7 +37,6 @@ from feasibility.runtime.provenance import provenance
 from feasibility.runtime.workers import in_threads, worker_pool
 
 SECOND_SEED, SECOND_HARD_SEED, UNSOLVED_SEED = 12, 103, 900
-NEW_SEED, NEW_HARD_SEED = 13, 104
 
 VIEWS: Final = {"rendezvous": RENDEZVOUS, "free-ends": FREE_ENDS}
 
@@ -72,9 +66,6 @@ HARD: Final = {
 }
 """Legs of which the model before is most unsure, and their seeds."""
 
-NEW: Final = {"rendezvous": {}, "free-ends": {"flyby": (60_000, 30_000)}}
-"""Family: legs that the nets go on with, and doubtful ones, with seeds of their own."""
-
 UNSOLVED: Final = 3_000_000
 """Legs about which the teachers are asked, in the proportions of the solved ones."""
 
@@ -94,16 +85,6 @@ def folders(sort: str, options: argparse.Namespace) -> Iterator[Path]:
         for legs, seed in rounds:
             made = harder(protocol(family, tables), Path(options.start), HARD_FACTOR)
             yield _made(made, legs, out / f"hard-{seed}" / family, seed, workers)
-
-
-def new_folders(sort: str, options: argparse.Namespace) -> Iterator[Path]:
-    """Make the datasets with which the nets go on, and yield their folders."""
-    out, workers, tables = options.out, options.workers, options.shared / "gtoc" / "official"
-    for family, (legs, doubtful) in NEW[sort].items():
-        made = protocol(family, tables)
-        yield _made(made, legs, out / "new" / family, NEW_SEED, workers)
-        made = harder(made, Path(options.start), HARD_FACTOR)
-        yield _made(made, doubtful, out / "new-hard" / family, NEW_HARD_SEED, workers)
 
 
 def _made(made: Protocol, legs: int, folder: Path, seed: int, workers: int) -> Path:
@@ -182,34 +163,27 @@ def train(options: argparse.Namespace) -> None:
     say(f"{len(unsolved.hint)} unsolved legs")
     start = FeasibilityClassifier.load(options.start).artefact
     shape = {"device": options.device, "threads": options.workers, "seed": 1}
+    how = Distillation(
+        teachers=StackRecipe(
+            count=options.teachers,
+            epochs=options.teacher_epochs,
+            width=options.width,
+            batch=options.batch,
+            **shape,
+        ),
+        student=StackRecipe(
+            epochs=options.student_epochs, batch=2 * options.batch, width=256, **shape
+        ),
+    )
 
     def on_epoch(who: str, epoch: int, loss: float) -> None:
         if epoch % 5 == 0:
             say(who, epoch, round(loss, 6))
 
-    if options.verb == "go-on":
-        recipe = StackRecipe(
-            epochs=options.student_epochs, batch=options.batch, learning_rate=4e-4, **shape
-        )
-        found = go_on(examples, unsolved, view, start, recipe, on_epoch=on_epoch)
-    else:
-        how = Distillation(
-            teachers=StackRecipe(
-                count=options.teachers,
-                epochs=options.teacher_epochs,
-                width=options.width,
-                batch=options.batch,
-                **shape,
-            ),
-            student=StackRecipe(
-                epochs=options.student_epochs, batch=2 * options.batch, width=256, **shape
-            ),
-        )
-        found = distil(examples, unsolved, view, start, how, on_epoch=on_epoch)
+    found = distil(examples, unsolved, view, start, how, on_epoch=on_epoch)
     before = found.model.provenance
     numbers = {"legs": len(source), "unsolved": len(unsolved.hint)}
-    name = f"{options.sort}, {options.verb}" if options.verb == "go-on" else options.sort
-    done = {**before.get("distilled", {}), name: {**provenance(), **numbers}}
+    done = {**before.get("distilled", {}), options.sort: {**provenance(), **numbers}}
     replace(found.model, provenance={**before, "distilled": done}).save(options.model)
     relevant = examples.weight[found.held_out] == 1.0
     for number in [-1, *np.unique(source)]:
@@ -229,7 +203,7 @@ def train(options: argparse.Namespace) -> None:
 def main() -> int:
     """Read the command line and do it."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("verb", choices=("pack", "train", "pack-new", "go-on"))
+    parser.add_argument("verb", choices=("pack", "train"))
     parser.add_argument("sort", choices=tuple(VIEWS))
     parser.add_argument("--out", type=Path, default=Path("data/default"), help="folder of legs")
     parser.add_argument("--file", type=Path, required=True, help="file of packed legs")
@@ -248,9 +222,8 @@ def main() -> int:
     parser.add_argument("--shared", type=Path, default=Path("../shared"), help="data folder")
     parser.add_argument("--tables", type=Path, help="folder of the official tables")
     options = parser.parse_args()
-    if options.verb.startswith("pack"):
-        made = folders if options.verb == "pack" else new_folders
-        datasets = [read_dataset(folder) for folder in made(options.sort, options)]
+    if options.verb == "pack":
+        datasets = [read_dataset(folder) for folder in folders(options.sort, options)]
         print(pack(datasets, VIEWS[options.sort], options.file), "legs")
     else:
         train(options)

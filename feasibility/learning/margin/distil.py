@@ -75,7 +75,7 @@ class Distilled:
         The examples that neither the teachers nor the student learned from.
     errors : mapping of str to array
         Errors of log m* on these (m,): of the model before, which may know some of them, the
-        teachers' mean, the student; or before and after.
+        teachers' mean, the student.
     """
 
     model: Artefact
@@ -151,65 +151,6 @@ def distil(
         "student": MarginNet(net)(examples.X[held])[0] - examples.error[held],
     }
     return Distilled(_with_net(start, view, net, examples, parts, how.seed), held, errors)
-
-
-def go_on(
-    examples: MarginExamples,
-    unsolved: UnsolvedLegs,
-    view: LegView,
-    start: Artefact,
-    recipe: StackRecipe,
-    *,
-    seed: int = 1,
-    on_epoch: Callable[[str, int, float], None] = lambda *_: None,
-) -> Distilled:
-    """Let a model's net learn solved legs that it has never seen, and keep its other opinions.
-
-    About the unsolved legs it is to think as before. Calibration and all else stay: the legs that
-    were left out are not at hand here.
-
-    Parameters
-    ----------
-    examples : MarginExamples
-        New legs; a part is left out, for the errors that are returned.
-    unsolved, view, start, on_epoch
-        As for `distil`.
-    recipe : StackRecipe
-        How to train.
-    seed : int
-        Which legs are left out.
-
-    Raises
-    ------
-    InputError
-        Too few legs.
-    MissingDependencyError
-        The extra ``train`` is not installed.
-    """
-    parts = Parts.of(examples, MarginRecipe(seed=seed, batch=recipe.batch))
-    rows, known = parts.learned, examples.error
-    before = start.section(view.section("model"))
-    opinion = MarginNet(before)(unsolved.X.astype(np.float64))[0]
-    lessons = Lessons(
-        X=np.concatenate([examples.X[rows].astype(np.float32), unsolved.X]),
-        target=np.concatenate([known[rows], opinion]),
-        weight=np.concatenate([examples.weight[rows], np.ones(len(opinion))]),
-        truth=np.concatenate([known[rows], np.full(len(opinion), np.nan)]),
-    )
-    (net,) = fit_stack(
-        lessons,
-        replace(recipe, count=1),
-        start=before,
-        on_epoch=lambda epoch, loss: on_epoch("net", epoch, loss),
-    )
-    held = np.concatenate([parts.validation, parts.calibration])
-    errors = {
-        name: MarginNet(one)(examples.X[held])[0] - known[held]
-        for name, one in (("before", before), ("after", net))
-    }
-    prefix = f"{view.section('model')}/"
-    arrays = {**start.arrays, **{f"{prefix}{name}": array for name, array in net.items()}}
-    return Distilled(replace(start, arrays=arrays), held, errors)
 
 
 def _with_net(

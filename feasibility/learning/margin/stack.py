@@ -42,7 +42,7 @@ class StackRecipe:
     count : int
         Nets; each has its own random weights and its own order of the rows.
     layers, width : int
-        Hidden layers, and units of each; those of the net it starts from count.
+        Hidden layers, and units of each.
     epochs, batch : int
         Passes over the rows, and rows a step.
     learning_rate, weight_decay : float
@@ -105,7 +105,6 @@ def fit_stack(
     lessons: Lessons,
     recipe: StackRecipe,
     *,
-    start: Mapping[str, _Array] | None = None,
     on_epoch: Callable[[int, float], None] = lambda *_: None,
 ) -> list[dict[str, _Array]]:
     """Train nets and return the arrays of each for `MarginNet`.
@@ -116,8 +115,6 @@ def fit_stack(
         Rows to learn from.
     recipe : StackRecipe
         How to train.
-    start : mapping of str to array, optional
-        Arrays of a net, with the unit of these: its weights and scales are where all nets begin.
     on_epoch : callable
         Called with the number of each epoch and the mean loss in it.
 
@@ -136,16 +133,12 @@ def fit_stack(
     device = recipe.device
     if device == "auto":
         device = "cuda" if torch.cuda.is_available() else "cpu"
-    mean, std = _scales(lessons.X) if start is None else (start["mean"], start["std"])
+    mean, std = _scales(lessons.X)
     if device == "cuda":
         # Factors are cut to ten bits, which is enough for gradients.
         torch.set_float32_matmul_precision("high")
     data = _tensors(torch, lessons, mean, std, device)
-    if start is None:
-        parts = _first_weights(torch, recipe, lessons.X.shape[1])
-    else:
-        parts = _known_weights(torch, recipe.count, start)
-    weights = [part.to(device).requires_grad_() for part in parts]
+    weights = _first_weights(torch, recipe, lessons.X.shape[1], device)
     step = _Step(torch, weights, data, recipe, device)
     batches = n // recipe.batch
     generator = torch.Generator(device=device).manual_seed(recipe.seed + 1)
@@ -298,7 +291,7 @@ def _tensors(
     return x, *(torch.from_numpy(column.astype(np.float32)).to(device) for column in columns)
 
 
-def _first_weights(torch: Any, recipe: StackRecipe, inputs: int) -> list[Any]:
+def _first_weights(torch: Any, recipe: StackRecipe, inputs: int, device: str) -> list[Any]:
     """Return weights (count, in, out) and biases (count, 1, out) of the layers in turn."""
     parts: list[Any] = []
     generator = torch.Generator().manual_seed(recipe.seed)
@@ -310,18 +303,7 @@ def _first_weights(torch: Any, recipe: StackRecipe, inputs: int) -> list[Any]:
             drawn = torch.rand(shape, generator=generator)
             parts.append((2.0 * drawn - 1.0) * bound)
     parts[-1].zero_()
-    return parts
-
-
-def _known_weights(torch: Any, count: int, net: Mapping[str, _Array]) -> list[Any]:
-    """Return the same of a net, `count` times."""
-    layers = sum(name.startswith("weight_") for name in net)
-    pairs = [(net[f"weight_{i}"].T, net[f"bias_{i}"][None]) for i in range(layers)]
-    return [
-        torch.tensor(part, dtype=torch.float32).expand(count, *part.shape).clone()
-        for pair in pairs
-        for part in pair
-    ]
+    return [part.to(device).requires_grad_() for part in parts]
 
 
 def _arrays(weights: list[Any], k: int, mean: _Array, std: _Array) -> dict[str, _Array]:

@@ -207,13 +207,11 @@ def _with_record(artefact: Artefact, other: Artefact) -> Artefact:
     def taught(model: Artefact) -> dict[str, Any]:
         return dict(model.provenance.get("distilled", {}))
 
-    # Students of an ensemble have records of their own, whose names begin with the sort of legs.
-    distilled = {
-        name: one
-        for model, is_free in ((artefact, False), (other, True))
-        for name, one in taught(model).items()
-        if name.startswith("free-ends") == is_free
-    }
+    # Students of an ensemble have a record of their own for each sort of legs.
+    free = taught(other).get("free-ends")
+    distilled = {name: one for name, one in taught(artefact).items() if name != "free-ends"}
+    if free is not None:
+        distilled["free-ends"] = free
     provenance = joined(artefact.provenance, other.provenance)
     return replace(
         artefact,
