@@ -29,11 +29,11 @@ UNIT: Final = 0.02
 """Unit of the nets' corrections of logarithms: errors are of this order, and a fixed one keeps
 the loss comparable between trainings."""
 
-_LARGEST_MISS: Final = 50.0
+LARGEST_MISS: Final = 50.0
 _WEIGHT_DECAY: Final = 1e-4
-_WARM_UP: Final = 0.08
-_SIZE_WEIGHT: Final = 0.1
-_LARGEST_GRADIENT: Final = 5.0
+WARM_UP: Final = 0.08
+SIZE_WEIGHT: Final = 0.1
+LARGEST_GRADIENT: Final = 5.0
 
 
 @final
@@ -105,6 +105,13 @@ class MarginEpoch:
 OnEpoch = Callable[[MarginEpoch], None]
 
 
+def device_of(name: str) -> str:
+    """Return "cpu" or "cuda"; of "auto", a GPU where there is one."""
+    if name != "auto":
+        return name
+    return "cuda" if load_extra("torch").cuda.is_available() else "cpu"
+
+
 def fit_net(
     X: _Array,
     error: _Array,
@@ -160,9 +167,7 @@ def fit_net(
     torch = load_extra("torch")
     torch.set_num_threads(recipe.threads)
     torch.manual_seed(recipe.seed)
-    device = recipe.device
-    if device == "auto":
-        device = "cuda" if torch.cuda.is_available() else "cpu"
+    device = device_of(recipe.device)
     mean, std = X[learned].mean(axis=0), X[learned].std(axis=0) + 1e-6
     sizes = [X.shape[1], *[width] * layers]
     if start is not None:
@@ -182,7 +187,7 @@ def fit_net(
     )
     batches = max(len(learned) // recipe.batch, 1)
     schedule = torch.optim.lr_scheduler.OneCycleLR(
-        optimiser, recipe.learning_rate, total_steps=epochs * batches, pct_start=_WARM_UP
+        optimiser, recipe.learning_rate, total_steps=epochs * batches, pct_start=WARM_UP
     )
     work = _Epochs(
         recipe, network, optimiser, schedule, tensors(learned), tensors(validation), unit,
@@ -232,8 +237,8 @@ class _Epochs:
             rows = order[first : first + recipe.batch]
             loss, size_loss = self._losses(torch, *(column[rows] for column in self.learned))
             self.optimiser.zero_grad()
-            (loss + _SIZE_WEIGHT * size_loss).backward()
-            torch.nn.utils.clip_grad_norm_(self.network.parameters(), _LARGEST_GRADIENT)
+            (loss + SIZE_WEIGHT * size_loss).backward()
+            torch.nn.utils.clip_grad_norm_(self.network.parameters(), LARGEST_GRADIENT)
             self.optimiser.step()
             self.schedule.step()
             total += loss.item()
@@ -250,7 +255,7 @@ class _Epochs:
         loss = torch.nn.functional.smooth_l1_loss(mean_out, target, beta=0.5, reduction="none")
         # The second output learns the size of the error that the first one makes: the
         # likelihood of a Laplace or a normal distribution.
-        miss = (mean_out - target).abs().detach().clamp(max=_LARGEST_MISS)
+        miss = (mean_out - target).abs().detach().clamp(max=LARGEST_MISS)
         if self.heed_outliers:
             size_loss = scale_out + 0.5 * miss * miss * torch.exp(-2.0 * scale_out)
         else:

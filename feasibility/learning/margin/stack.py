@@ -16,15 +16,18 @@ from numpy.typing import NDArray
 
 from feasibility.classifier.margin.network import INPUT_LIMIT
 from feasibility.errors import InputError
-from feasibility.learning.margin.fit import UNIT
+from feasibility.learning.margin.fit import (
+    LARGEST_GRADIENT,
+    LARGEST_MISS,
+    SIZE_WEIGHT,
+    UNIT,
+    WARM_UP,
+    device_of,
+)
 from feasibility.runtime.extras import load_extra
 
 _Array = NDArray[np.float64]
 
-_WARM_UP: Final = 0.08
-_SIZE_WEIGHT: Final = 0.1
-_LARGEST_GRADIENT: Final = 5.0
-_LARGEST_MISS: Final = 50.0
 _LEAST_RATE: Final = 0.04
 """Learning rate of the first step, as a share of the largest one."""
 
@@ -130,9 +133,7 @@ def fit_stack(
         raise InputError(f"stack: {n} rows, expected at least one batch of {recipe.batch}")
     torch = load_extra("torch")
     torch.set_num_threads(recipe.threads)
-    device = recipe.device
-    if device == "auto":
-        device = "cuda" if torch.cuda.is_available() else "cpu"
+    device = device_of(recipe.device)
     mean, std = _scales(lessons.X)
     if device == "cuda":
         # Factors are cut to ten bits, which is enough for gradients.
@@ -159,8 +160,7 @@ def mean_opinion(
 ) -> _Array:
     """Return (n,) the mean of what nets of one shape and scale predict for inputs (n, k)."""
     torch = load_extra("torch")
-    if device == "auto":
-        device = "cuda" if torch.cuda.is_available() else "cpu"
+    device = device_of(device)
     first = nets[0]
     layers = sum(name.startswith("weight_") for name in first)
     weights = []
@@ -188,11 +188,9 @@ def _scaled(X: NDArray[Any], mean: _Array, std: _Array) -> NDArray[np.float32]:
 
 def _rate(done: float) -> float:
     """Return the learning rate as a share of the largest, after a share of all steps."""
-    if done < _WARM_UP:
-        return _LEAST_RATE + (1.0 - _LEAST_RATE) * 0.5 * (
-            1.0 - math.cos(math.pi * done / _WARM_UP)
-        )
-    return 0.5 * (1.0 + math.cos(math.pi * (done - _WARM_UP) / (1.0 - _WARM_UP)))
+    if done < WARM_UP:
+        return _LEAST_RATE + (1.0 - _LEAST_RATE) * 0.5 * (1.0 - math.cos(math.pi * done / WARM_UP))
+    return 0.5 * (1.0 + math.cos(math.pi * (done - WARM_UP) / (1.0 - WARM_UP)))
 
 
 @final
@@ -246,13 +244,13 @@ class _Step:
         x, target, weight, truth, known = (column[self._rows] for column in self._data)
         mean_out, scale_out = _outputs(torch, self._weights, x)
         loss = torch.nn.functional.smooth_l1_loss(mean_out, target, beta=0.5, reduction="none")
-        miss = (mean_out - truth).abs().detach().clamp(max=_LARGEST_MISS)
+        miss = (mean_out - truth).abs().detach().clamp(max=LARGEST_MISS)
         size_loss = known * (scale_out + miss * torch.exp(-scale_out))
         losses = (weight * loss).mean(dim=1).sum()
         self._optimiser.zero_grad(set_to_none=False)
-        (losses + _SIZE_WEIGHT * (weight * size_loss).mean(dim=1).sum()).backward()
+        (losses + SIZE_WEIGHT * (weight * size_loss).mean(dim=1).sum()).backward()
         squares = sum(part.grad.square().flatten(1).sum(1) for part in self._weights)
-        share = (_LARGEST_GRADIENT / (squares.sqrt() + 1e-6)).clamp(max=1.0)
+        share = (LARGEST_GRADIENT / (squares.sqrt() + 1e-6)).clamp(max=1.0)
         for part in self._weights:
             part.grad.mul_(share.view(-1, 1, 1))
         self._optimiser.step()
